@@ -19,137 +19,79 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # as in "typing", whose import takes longer than the rest of a stop
 
-__all__ = [
-    "Arm",
-    "ArmFrame",
-    "ArmPallet",
-    "ArmPosture",
-    "ArmTool",
-    "ArmtempoError",
-    "Board",
-    "BoardError",
-    "BoardState",
-    "Count",
-    "Driver",
-    "Dynamics",
-    "EachPlace",
-    "Encoder",
-    "Goto",
-    "Hold",
-    "Input",
-    "InputError",
-    "Job",
-    "Joint",
-    "LimitSwitches",
-    "Limits",
-    "LinkError",
-    "Load",
-    "MissingPackageError",
-    "Motor",
-    "Output",
-    "Plan",
-    "PlanError",
-    "Pose",
-    "Repeat",
-    "Run",
-    "RunFolderError",
-    "RunMotion",
-    "Safety",
-    "Sequence",
-    "SequencePlan",
-    "SetOutput",
-    "SharedBoard",
-    "Spline",
-    "Step",
-    "Stop",
-    "StopRequest",
-    "Stopped",
-    "ToPlace",
-    "ToolSegment",
-    "Trajectory",
-    "UseTool",
-    "Wait",
-    "WaitInput",
-    "Watcher",
-    "__version__",
-    "attach",
-    "compare",
-    "connect",
-    "deploy",
-    "find_ports",
-    "forward",
-    "inverse",
-    "inverse_many",
-    "optimise",
-    "plan",
-    "plan_sequence",
-    "simulator",
-    "summary",
-]
-
 if TYPE_CHECKING:
     from typing import Any
 
     __version__: str
 
-    from armtempo import deploy, optimise, simulator
+    from armtempo import deploy as deploy, optimise as optimise, simulator as simulator
     from armtempo.basics.errors import (
-        ArmtempoError,
-        BoardError,
-        InputError,
-        LinkError,
-        MissingPackageError,
-        PlanError,
-        RunFolderError,
+        ArmtempoError as ArmtempoError,
+        BoardError as BoardError,
+        InputError as InputError,
+        LinkError as LinkError,
+        MissingPackageError as MissingPackageError,
+        PlanError as PlanError,
+        RunFolderError as RunFolderError,
     )
-    from armtempo.kinematics.of_arm import forward, inverse, inverse_many
-    from armtempo.model.arm import Arm
-    from armtempo.model.frame import ArmFrame
-    from armtempo.model.job import Job, Stop
-    from armtempo.model.outputs import Input, Output
-    from armtempo.model.pallet import ArmPallet
+    from armtempo.kinematics.of_arm import (
+        forward as forward,
+        inverse as inverse,
+        inverse_many as inverse_many,
+    )
+    from armtempo.model.arm import Arm as Arm
+    from armtempo.model.frame import ArmFrame as ArmFrame
+    from armtempo.model.job import Job as Job, Stop as Stop
+    from armtempo.model.outputs import Input as Input, Output as Output
+    from armtempo.model.pallet import ArmPallet as ArmPallet
     from armtempo.model.parts import (
-        Driver,
-        Dynamics,
-        Encoder,
-        Joint,
-        Limits,
-        LimitSwitches,
-        Load,
-        Motor,
-        Safety,
+        Driver as Driver,
+        Dynamics as Dynamics,
+        Encoder as Encoder,
+        Joint as Joint,
+        Limits as Limits,
+        LimitSwitches as LimitSwitches,
+        Load as Load,
+        Motor as Motor,
+        Safety as Safety,
     )
-    from armtempo.model.plan import Plan
-    from armtempo.model.posture import ArmPosture
-    from armtempo.model.sequence import Sequence
-    from armtempo.model.sequence_plan import SequencePlan
+    from armtempo.model.plan import Plan as Plan
+    from armtempo.model.posture import ArmPosture as ArmPosture
+    from armtempo.model.sequence import Sequence as Sequence
+    from armtempo.model.sequence_plan import SequencePlan as SequencePlan
     from armtempo.model.steps import (
-        Count,
-        EachPlace,
-        Goto,
-        Hold,
-        Repeat,
-        RunMotion,
-        SetOutput,
-        Step,
-        ToPlace,
-        UseTool,
-        Wait,
-        WaitInput,
+        Count as Count,
+        EachPlace as EachPlace,
+        Goto as Goto,
+        Hold as Hold,
+        Repeat as Repeat,
+        RunMotion as RunMotion,
+        SetOutput as SetOutput,
+        Step as Step,
+        ToPlace as ToPlace,
+        UseTool as UseTool,
+        Wait as Wait,
+        WaitInput as WaitInput,
     )
-    from armtempo.model.tool import ArmTool
-    from armtempo.model.tool_pose import Pose
-    from armtempo.model.tool_segment import ToolSegment
-    from armtempo.pipeline import compare, connect, plan, plan_sequence, summary
-    from armtempo.ports.board_port import find_ports
-    from armtempo.report.run import Run
-    from armtempo.robot.board import Board
-    from armtempo.robot.board_state import BoardState
-    from armtempo.robot.recording import Watcher
-    from armtempo.robot.shared_board import SharedBoard, attach
-    from armtempo.robot.stop_request import Stopped, StopRequest
-    from armtempo.splines.bspline import Spline
-    from armtempo.splines.trajectory import Trajectory
+    from armtempo.model.tool import ArmTool as ArmTool
+    from armtempo.model.tool_pose import Pose as Pose
+    from armtempo.model.tool_segment import ToolSegment as ToolSegment
+    from armtempo.pipeline import (
+        compare as compare,
+        connect as connect,
+        plan as plan,
+        plan_sequence as plan_sequence,
+        summary as summary,
+    )
+    from armtempo.ports.board_port import find_ports as find_ports
+    from armtempo.report.run import Run as Run
+    from armtempo.robot.board import Board as Board
+    from armtempo.robot.board_state import BoardState as BoardState
+    from armtempo.robot.recording import Watcher as Watcher
+    from armtempo.robot.shared_board import SharedBoard as SharedBoard, attach as attach
+    from armtempo.robot.stop_request import Stopped as Stopped, StopRequest as StopRequest
+    from armtempo.splines.bspline import Spline as Spline
+    from armtempo.splines.trajectory import Trajectory as Trajectory
 
 _HOMES = {
     "armtempo.basics.errors": (
@@ -213,6 +155,7 @@ _HOMES = {
 _MODULES = ("deploy", "optimise", "simulator")
 """Public subpackages; their ``__all__`` lists their public names."""
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+__all__ = sorted([*_HOME_OF, *_MODULES, "__version__"])
 
 
 def __getattr__(name: str) -> Any:

@@ -78,9 +78,10 @@ def split(arm: Arm, job: Job, progress: Progress | None = None) -> list[Plan]:
         whole = planner.plan(arm, job, progress)
         if whole.total_s <= cut.LONGEST_S:
             return [whole]
-        parts = cut.at_few_stops(job, whole.via_deg, whole.trajectory)
+        parts = cut.at_few_stops(whole.job, whole.via_deg, whole.trajectory)
     else:
-        parts = cut.at_all_stops(job, planner.via_angles(arm, job)[0])
+        points = planner.points_of(arm, job)
+        parts = cut.at_all_stops(points.job, points.via_deg)
     return [planner.plan(arm, one, part(progress, number, len(parts))) for number, one in enumerate(parts)]
 
 

@@ -22,10 +22,11 @@ from typing import Any
 
 import armtempo_board
 import numpy as np
-from armtempo_board.app.cell import Cell, CellError, Ended
+from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended, opener
 from armtempo_board.app.pallet import Place
 from armtempo_shared.program import EACH, MARK
 from armtempo_shared.rest_to_rest import PERCENT
+from armtempo_shared.sequence import MAX_COUNTERS
 
 from armtempo.basics.errors import InputError
 from armtempo.encoding import encode, encoded_program, planned_for
@@ -49,7 +50,7 @@ class ProgramRun:
     """("home",), ("goto", name or angles), ("run", motion), ("set", output, value), ("tool", name), in order; ``start``
     counts as "run", and a place of a pallet has the name "row 1, column 1, layer 1 of pallet 'tray'"."""
     said: list[str] = field(default_factory=list)
-    """What it printed."""
+    """What it printed, line by line."""
     counters: dict[str, int] = field(default_factory=dict)
     outputs: dict[str, float] = field(default_factory=dict)
     """The last values, in the unit of each; at first the safe ones."""
@@ -96,8 +97,8 @@ def run(
     cell = _Recorded(table, work)
     names = {
         "__name__": "__main__",
-        "__file__": str(found.path),
         "print": work.print,
+        "open": opener(work),
         MARK: cell.at,
         EACH: cell.each,
     }
@@ -248,11 +249,16 @@ class _Work:
         self.run.taken[pallet[0]] = taken
 
     def count(self, name: str) -> int:
+        if len({*self.run.counters, *self._program.counters, name}) > MAX_COUNTERS:
+            raise CellError(TOO_MANY_COUNTERS)
         self.run.counters[name] = self.run.counters.get(name, 0) + 1
         return self.run.counters[name]
 
     def say(self, text: str) -> None:
-        self.run.said.append(text)
+        self.run.said += filter(None, text.split("\n"))
+
+    def will_write(self) -> None:
+        """Nothing to do."""
 
     def print(self, *values: object, sep: str = " ", end: str = "\n", file: object = None) -> None:
         """As on the board; also where pytest shows it."""

@@ -6,6 +6,7 @@ For arms that ship: forward kinematics by plain matrix products, scipy's B-splin
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from armtempo.model.arm import Arm
@@ -309,3 +310,27 @@ def _step(arm: Arm, here: np.ndarray, way: Way, part: float) -> np.ndarray | Non
         if not np.all(np.isfinite(angles)) or np.abs(angles - here).max() > 60.0:
             return None
     return None
+
+
+class RandomArc(NamedTuple):
+    """An arc of the tool."""
+
+    arm: Arm
+    start_deg: tuple[float, ...]
+    end: Pose
+    through_mm: tuple[float, float, float]
+
+
+def random_arc(seed: int) -> RandomArc:
+    """An arc of the SCARA or of the paper's arm, whose orientation is free."""
+    rng = np.random.default_rng(seed)
+    arm = Arm.paper() if seed % 2 else Arm.of("scara")
+    low, high = np.array([joint.range_deg for joint in arm.driven]).T
+    low, high = np.maximum(low, -170.0), np.minimum(high, 288.0)
+    here = 0.5 * (low + high) + 0.3 * (high - low) * rng.uniform(-1.0, 1.0, len(low))
+    there = np.clip(here + rng.uniform(-30.0, 30.0, len(here)), low, high)
+    between = 0.5 * (here + there) + rng.uniform(-4.0, 4.0, len(here))
+    end, through = tool_poses(arm, np.array([there, between]))
+    x, y, z = through[:3, 3].tolist()
+    end_pose = Pose(tuple(map(tuple, end.tolist())), fixed=())
+    return RandomArc(arm, tuple(here.tolist()), end_pose, (x, y, z))

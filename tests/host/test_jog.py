@@ -54,6 +54,22 @@ def test_the_law_keeps_its_limits_and_is_nearly_the_fastest() -> None:
         assert spline.duration_s <= max(move_law.SHORTEST_S * (1 + 1e-9), 1.15 * optimum_s)
 
 
+def test_time_goes_on_where_little_is_left_between_the_ramps() -> None:
+    """About as long as two ramps, as jogs of the tool are: a law with constant speed or without, within the limits."""
+    print("seed", seed := 11)
+    rng = random.Random(seed)
+    for _ in range(12):
+        joint = rng.choice(AR4.driven)
+        limits = move_law.of_joints([joint.limits], [1.0], rng.choice([0.05, 0.25, 1.0]))
+        parts = rng.choice([0, 8, 16, 32])
+        for length in limits.speed * limits.step_s(limits.speed, INF) * np.linspace(5.0, 40.0, 36):
+            law = move_law.law(length, limits, length / parts if parts else INF)
+            assert np.all(np.diff(law.time_s) > 0), (length, limits, parts)
+        reached = extremes.of_joint(JointSpline(move_law.DEGREE, 1, law.distance, law.time_s))
+        for value, most in zip(reached.values, (limits.speed, limits.acceleration, limits.jerk), strict=True):
+            assert value <= most * (1 + 1e-6)
+
+
 TIMES_S = (0.1, 0.2, 0.5, 1.0, 2.0)
 OPTIMUM_DEG = {
     "paper": (

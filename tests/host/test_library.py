@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import pkgutil
 import subprocess
@@ -88,6 +89,15 @@ def test_a_plan_is_computed_without_plots_and_ports() -> None:
 
 def test_every_public_name_is_there_and_described() -> None:
     assert dir(armtempo) == sorted(armtempo.__all__)
+    places = {
+        alias.asname: str(node.module)
+        for node in ast.walk(ast.parse(Path(armtempo.__file__).read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.asname
+    }
+    wanted = armtempo._HOME_OF | dict.fromkeys(armtempo._MODULES, "armtempo")
+    assert places == wanted, "what type checkers are told is what is imported"
     for name in armtempo.__all__:
         value = getattr(armtempo, name)
         assert name == "__version__" or inspect.getdoc(value), name

@@ -38,7 +38,6 @@ def test_store_commands(tmp_path: Path) -> None:
     assert caught.value.code == wire.ERROR_CODES["not_found"]
 
 
-@pytest.mark.slow
 class Listed:
     """A session with a board that has motions of these names."""
 

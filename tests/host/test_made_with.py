@@ -19,6 +19,7 @@ from armtempo.model.user_program import UserProgram
 from armtempo.robot.motions import Motions
 from armtempo.robot.position import ArmPosition
 from armtempo.robot.programs import Programs
+from armtempo.robot.store import BoardStore
 from armtempo_shared.motion import Motion
 
 from tests.host import test_pallets as pallets
@@ -196,6 +197,25 @@ class Stored:
 
     def home(self, _: object) -> None:
         pass
+
+
+def test_a_default_that_is_no_program_starts_nothing_at_power_up(
+    plan: Plan,
+    quick: None,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr("armtempo.robot.store.store", lambda *_: None)
+    motion = encoded_motion.of_plan(plan)
+    alone = replace(motion, arm=replace(motion.arm, safety=replace(motion.arm.safety, at_power_up="program")))
+    for what, told in ((motion, 0), (alone, 1)):
+        defaults: list[str] = []
+        client = SimpleNamespace(set_default=defaults.append)
+        board: Any = SimpleNamespace(client=client, encoded=lambda what, _: what)
+        BoardStore(board).upload(what, default=True)
+        assert defaults == [motion.name]
+        assert len(caplog.messages) == told
+    assert "nothing starts at power-up" in caplog.text
 
 
 def test_what_is_old_is_not_run_by_its_name_and_listed(

@@ -59,16 +59,6 @@ def test_no_plan_goes_beyond_a_switch_within_the_range() -> None:
     assert planner.plan(arms[0], replace(job, via=((20.0, -60.0, 40.0), (0.0, -60.0, 40.0)))).total_s
 
 
-@pytest.mark.slow
-def test_points_less_than_a_step_apart_are_named_where_the_spline_swings() -> None:
-    via = ((20.0, -60.0, 40.0), (20.00001, -60.0, 40.0), (120.0, -60.0, 40.0))
-    told = planner.plan(ARM, Job("twice", via=via, path="through", starts=1, optimiser="gradient")).notes
-    assert any(
-        "beyond both; P0 and P1 are less than a step apart: leave one out; or path" in note for note in told
-    )
-    assert not planner.plan(ARM, Job("twice", via=via)).notes
-
-
 def test_no_motor_is_faster_than_its_torque_curve_goes() -> None:
     """Joint 1 at 40 deg/s is 13.3 rpm."""
     first = ARM.joints[0]

@@ -126,6 +126,7 @@ def spoiled(change: dict[str, Any], point: dict[str, Any] | None = None) -> str:
         (f"---\n{spoiled({})}\n" * 2, "has 2 messages"),
         (spoiled({}, {"positions": [0.0, 0.0]}), "point 1: positions must be 3 numbers"),
         (spoiled({}, {"positions": [0.0, 0.0, "x"]}), "point 1: positions must be 3 numbers"),
+        (spoiled({}, {"positions": [0.0, 0.0, 10**400]}), "point 1: positions must be 3 numbers"),
         (spoiled({}, {"positions": [0.0, 0.0, float("nan")]}), "point 1: positions must be 3 numbers"),
         (spoiled({}, {"time_from_start": None}), "point 1: time_from_start None is no time"),
         (spoiled({}, {"time_from_start": 0.0}), "point 1: time_from_start does not increase"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -15,9 +16,14 @@ from armtempo_shared import meanings
 from tests import interpreters, sources
 from tests.interpreters import ROOT
 
-SITE = pytest.mark.xdist_group("site")  # what they share is made once
 CATALOGUE = sources.script(ROOT / "host" / "docs" / "site" / "catalogue.py")
 SITE_PAGES = sorted(page.relative_to(ROOT) for page in ROOT.glob("*/docs/*.md"))
+
+
+def of_the_site(test: Callable[..., None]) -> Callable[..., None]:
+    """Marks of a test that looks at the built site, which is made once and takes long."""
+    marked: Callable[..., None] = pytest.mark.slow(pytest.mark.long(pytest.mark.xdist_group("site")(test)))
+    return marked
 
 
 @pytest.fixture(scope="module")
@@ -33,9 +39,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "html"
 
 
-@pytest.mark.slow
-@SITE
-@pytest.mark.long
+@of_the_site
 def test_every_page_is_built_and_reached_from_the_first(site: Path) -> None:
     first = (site / "host" / "docs" / "index.html").read_text(encoding="utf-8")
     links = set(re.findall(r'class="reference internal" href="([^"#]+)"', first))
@@ -46,9 +50,7 @@ def test_every_page_is_built_and_reached_from_the_first(site: Path) -> None:
         assert page.name == "index.md" or built.resolve() in reached, page
 
 
-@pytest.mark.slow
-@SITE
-@pytest.mark.long
+@of_the_site
 def test_the_first_page_has_a_picture_and_two_buttons_and_no_list_of_pages(site: Path) -> None:
     text = (site / "host" / "docs" / "index.html").read_text(encoding="utf-8")
     article = text[text.index("<article") : text.index("</article>")]
@@ -58,9 +60,7 @@ def test_the_first_page_has_a_picture_and_two_buttons_and_no_list_of_pages(site:
     assert "the armtempo authors" in text[text.index("<footer") :]
 
 
-@pytest.mark.slow
-@SITE
-@pytest.mark.long
+@of_the_site
 def test_types_are_written_as_a_person_writes_them(site: Path) -> None:
     text = (site / "host" / "docs" / "api.html").read_text(encoding="utf-8")
     plain = re.sub(r"<[^>]+>", "", text)
@@ -69,9 +69,7 @@ def test_types_are_written_as_a_person_writes_them(site: Path) -> None:
     assert not re.findall(r"armtempo\.(?:model|basics|robot|splines|records)\.[a-z_.]+\.[A-Z]\w+", plain)
 
 
-@pytest.mark.slow
-@SITE
-@pytest.mark.long
+@of_the_site
 def test_the_papers_page_is_one_of_the_site(site: Path) -> None:
     text = (site / "host" / "docs" / "paper-repeated.html").read_text(encoding="utf-8")
     assert "sidebar" in text
@@ -88,9 +86,7 @@ def test_every_argument_is_described() -> None:
             assert CATALOGUE.described(command, argument) or "{" in argument, f"{name} {argument}"
 
 
-@pytest.mark.slow
-@SITE
-@pytest.mark.long
+@of_the_site
 def test_ranges_are_numbers(site: Path) -> None:
     page = re.sub(r"<[^>]+>", "", (site / "host" / "docs" / "commands.html").read_text(encoding="utf-8"))
     assert "RANGE" not in page
@@ -103,9 +99,7 @@ def test_links_say_where_they_lead() -> None:
         assert not found, page
 
 
-@pytest.mark.slow
-@SITE
-@pytest.mark.long
+@of_the_site
 def test_every_command_has_its_section(site: Path) -> None:
     page = (site / "host" / "docs" / "commands.html").read_text(encoding="utf-8")
     for name in main.list_commands(click.Context(main)):
@@ -113,9 +107,7 @@ def test_every_command_has_its_section(site: Path) -> None:
     assert "<td><p></p></td>" not in page
 
 
-@pytest.mark.slow
-@SITE
-@pytest.mark.long
+@of_the_site
 def test_every_code_of_the_board_is_listed(site: Path) -> None:
     page = (site / "host" / "docs" / "errors.html").read_text(encoding="utf-8")
     for code, (name, _, _) in meanings.ERRORS.items():
@@ -123,8 +115,6 @@ def test_every_code_of_the_board_is_listed(site: Path) -> None:
         assert name in page
 
 
-@pytest.mark.slow
-@SITE
-@pytest.mark.long
+@of_the_site
 def test_the_top_leads_to_the_first_page(site: Path) -> None:
     assert "host/docs/index.html" in (site / "index.html").read_text(encoding="utf-8")

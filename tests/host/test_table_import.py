@@ -177,6 +177,10 @@ RAD = ("0,-1.0471975511965976,0.6981317007977318", "0.349065850,-1.308996939,0.8
         ("\ufeffj1\tj2\tj3\r\n0\t-60\t4e1\r\n20\t-75\t50\r\n", None),
         ("\n".join(RAD), True),
         ("\n".join(("joint 1 (rad),joint 2 [rad],joint_3_rad", *RAD)), None),
+        ("t,j1,j2,j3\nms,deg,[rad],DEG\n0,0,-1.0471975512,40\n900,20,-1.3089969390,50\n", None),
+        ("j1;j2;j3;j1 speed\n(deg);(deg);(deg);deg/s\n0,0;-60;40;1\n20;-75;50;1\n", None),
+        ("j2 j1 j3\ndeg deg deg\n-60 0 40\n-75 20 50\n", None),
+        ("# j1,j2,j3\n# deg,deg,deg\n0,-60,40\n20,-75,50\n", None),
         ("joint 1 (deg),joint 2 (rad),joint 3\n0,-1.0471975512,40\n20,-1.3089969390,50\n", None),
     ],
 )
@@ -212,6 +216,9 @@ def test_via_points_come_from_any_sensible_table(tmp_path: Path, text: str, radi
         ("joint 1,joint 2,joint 2\n0,-60,40\n1,-75,50\n", "line 1: two columns are called 'joint2'"),
         ("joint 1,j2,joint 2,joint 3\n0,-60,1,40\n1,-75,1,50\n", "'j2' and 'joint 2' both name joint 2"),
         ("j1 (gon),j2,j3\n0,-60,40\n1,-75,50\n", "'j1 \\(gon\\)': the unit is not known"),
+        ("j1 (rad),j2,j3\ndeg,deg,deg\n0,-60,40\n1,-75,50\n", "'j1 .rad.' is in deg by the line below"),
+        ("j1,j2,j3\ndeg,deg,degs\n0,-60,40\n1,-75,50\n", "'j3 .degs.': the unit is not known"),
+        ("j1,j2,j3\nrad,rad\n0,-60,40\n1,-75,50\n", "line 2: 2 values, but 3 columns"),
         (
             "j1,j2,j3,j4\n0,-60,40,0\n20,-75,50,9\n",
             "line 3: joint 4 at 9 degrees has no motor, it stays at 0",

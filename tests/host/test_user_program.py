@@ -14,7 +14,9 @@ import pytest
 from armtempo import testing
 from armtempo.basics.errors import InputError, LinkError, PlanError
 from armtempo.deploy import program_files
+from armtempo.diagnosis.arm_check import check_arm
 from armtempo.encoding import encode, encoded_motion, encoded_program
+from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.of_arm import forward
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello
@@ -74,7 +76,20 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
         ("cell.set('', 1)\n", 2, "no output ''"),
         ("cell.tool('')\n", 2, "the name of the tool is empty"),
         ("import time\ntime.sleep(1)\n", 3, "keeps the board from its work"),
+        ("from time import sleep as rest\nrest(1)\n", 3, "time.sleep keeps the board from its work"),
+        ("import utime as t\nt.sleep_ms(20)\n", 3, "time.sleep_ms keeps the board from its work"),
         ("\nname = input('which? ')\n", 3, "waits for a terminal"),
+        ("import machine\nmachine.reset()\n", 3, "restarts the board, and the arm's position is lost"),
+        ("from machine import Pin\nPin('PA15', Pin.OUT)\n", 3, "PA15 is taken for STEP of channel 1"),
+        ("import pyb\nled = pyb.Pin(pyb.Pin.board.E12)\n", 3, "PE12 is taken for ENABLE of the drivers"),
+        ("import machine\nmachine.Pin('PB8').value(1)\n", 3, "PB8 is output 'gripper' of the arm"),
+        ("import pyb\nx = pyb.Timer(2, freq=10)\n", 3, "timer 2 is taken for the step pulses"),
+        ("import pyb\npyb.USB_VCP().close()\n", 3, "takes the link to the host"),
+        ("import _thread\n_thread.start_new_thread(print, ())\n", 3, "MicroPython has no threads"),
+        ("import armtempo_board.app.program\n", 2, "is the board's own"),
+        ("async def f():\n    await cell.goto('home')\n", 3, "cell.goto is no coroutine"),
+        ("async def f():\n    pass\nf()\n", 4, r"f\(\) does nothing, as it is a coroutine"),
+        ("cell.serve()\n", 2, r"cell.serve\(\) does nothing"),
         ("\nimport pick\n", 3, "the board gets this file alone, not pick.py beside it"),
     ],
 )
@@ -83,6 +98,16 @@ def test_what_is_wrong_is_named_with_its_line(text: str, line: int, problem: str
     with pytest.raises(InputError, match=problem) as raised:
         UserProgram.load(path, ARM)
     assert f"pick.py, line {line}: " in str(raised.value)
+
+
+def test_what_is_a_programs_own_is_not_refused(tmp_path: Path) -> None:
+    text = (
+        "import asyncio, time, machine\nfrom pyb import Timer\n"
+        "machine.Pin('PC12', machine.Pin.IN).value()\nTimer(12, freq=5)\nmachine.Timer(-1)\ntime.sleep_us(40)\n"
+        "async def f():\n    await asyncio.sleep(0)\n"
+        "async def main():\n    asyncio.create_task(cell.serve())\n    await f()\nasyncio.run(main())\n"
+    )
+    assert UserProgram.load(written(text, tmp_path), ARM).source.endswith(text)
 
 
 def with_switches(*joints: int, **safety: object) -> Arm:
@@ -141,6 +166,28 @@ def test_what_moves_by_itself_has_switches_and_an_estop(
         Arm.load(tmp_path / "arm.toml")
 
 
+def test_a_way_to_a_switch_that_would_leave_the_workspace_is_told(tmp_path: Path) -> None:
+    """Joint 1 turns to its switch at the low end of its range, through what stands there."""
+    arm = with_switches(1, 2, 3)
+    found = encoded_program.of_program(UserProgram.load(written("cell.home()\n", tmp_path), arm), arm)
+    assert not encoded_program.moves_that_touch(found)
+    there = forward(arm, all_angles_deg(arm, np.array([arm.driven[0].range_deg[0], *arm.home_deg[1:]])))[
+        :3, 3
+    ]
+    box = KeepOut("post", tuple(there - 5.0), tuple(there + 5.0))
+    (problem,) = encoded_program.moves_that_touch(
+        replace(found, arm=replace(arm, workspace=Workspace((box,))))
+    )
+    assert problem.startswith("between home and the switch of joint 1: ")
+    assert "post" in problem
+    (told,) = [
+        each for each in check_arm(replace(arm, workspace=Workspace((box,)))) if each.where == "homing"
+    ]
+    assert problem in told.what
+    plain = encoded_program.of_program(UserProgram.load(written("cell.goto('home')\n", tmp_path), arm), arm)
+    assert not encoded_program.moves_that_touch(replace(plain, arm=replace(arm, workspace=Workspace((box,)))))
+
+
 def test_other_refusals(tmp_path: Path) -> None:
     for name, text in (("my pick.py", HEAD), ("pick.py", "print(1)\n")):
         (tmp_path / name).write_text(text)
@@ -169,7 +216,7 @@ def test_marks_keep_the_lines_and_the_meaning(tmp_path: Path) -> None:
         "    for á, b in (1, 2), (3, 4):\n"
         "        n += á; arm.say(f'{arm.active(\"part\")}', arm.active(\n            'part'))\n"
         "while (x := n + 1) < 4: n = x\n"
-        "print([arm.active('part') for _ in range(3)], n)\n"
+        "print([arm.active('part') for _ in range(3)], n, sum(x * y for x in (1, 2) for y in range(x) if y))\n"
     )
     (tmp_path / "pick.py").write_text(text)
     found = UserProgram.load(tmp_path / "pick.py", ARM)
@@ -180,8 +227,9 @@ def test_marks_keep_the_lines_and_the_meaning(tmp_path: Path) -> None:
     assert lines[0] == lines[1]
     assert "__at__(3) and (__at__(3, arm).active('part') or n < 3)" in found.marked
     assert "in __each__(4, ((1, 2), (3, 4))):" in found.marked
+    assert "for x in __each__(8, ((1, 2))) for y in __each__(8, (range(x))) if y" in found.marked
     run = testing.run(tmp_path / "pick.py", ARM)
-    assert run.said == ["False False"] * 2 + ["[False, False, False] 4"]
+    assert run.said == ["False False"] * 2 + ["[False, False, False] 4 2"]
 
 
 class Record(ProgramRecord):
@@ -410,6 +458,16 @@ def test_what_a_program_raises_passes_and_endless_ones_end(
     run = testing.run(written("cell.set('gripper', 'closed')\ncell.sleep(2)\n", tmp_path), ARM)
     assert run.outputs["gripper"] == pytest.approx(95.0, abs=0.01)
     assert run.time_s >= 2.0
+    run = testing.run(written("print('a\\n\\nb')\nprint()\n", tmp_path), ARM)
+    assert run.said == ["a", "b"]  # as the host is told
+    with pytest.raises(CellError, match="more than 8 counters"):
+        testing.run(written("for n in range(9):\n    cell.count('n%d' % n)\n", tmp_path), ARM)
+    with pytest.raises(CellError, match="'log' cannot be written while the arm moves"):
+        testing.run(
+            written("cell.goto([5, -60, 40], wait=False)\nopen('log', 'a')\n", tmp_path), ARM, motion_s=1.0
+        )
+    with pytest.raises(NameError):
+        testing.run(written("print(__file__)\n", tmp_path), ARM)
     source = (
         "import asyncio\nasync def main():\n    task = asyncio.create_task(cell.serve())\n"
         "    await asyncio.sleep(0)\n    print('in a task')\n    task.cancel()\nasyncio.run(main())\n"

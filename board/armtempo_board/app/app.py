@@ -37,6 +37,7 @@ if features.SEQUENCES:
         "armtempo_board.app.cell",
         "armtempo_board.app.pallet",
         "armtempo_board.app.homing",
+        "armtempo_shared.homing",
         "armtempo_shared.rest_to_rest",
         "armtempo_shared.shapes",
     )
@@ -65,8 +66,8 @@ class App:
         self.link.forget()
 
     if features.SEQUENCES:
-        fills_heap = False
-        """A user's program executes: it is at fault if memory is short."""
+        runs_program = False
+        """A user's program executes: it is at fault if the heap or the stack is full."""
 
         def execute_program(self, run_once: "Callable[[], None]") -> None:
             """Execute the user's program that was started, if one was; ``run_once``: one pass of the loop."""
@@ -118,9 +119,9 @@ class App:
         """Freeze and note the fault.
 
         Raises the error again after too many consecutive failures, and if it is a user's program that has filled the
-        heap: the program gets it, in its call of the cell.
+        heap, or the stack by recursion (RuntimeError): the program gets it, in its call of the cell.
         """
-        if features.SEQUENCES and self.fills_heap and isinstance(error, MemoryError):
+        if features.SEQUENCES and self.runs_program and isinstance(error, (MemoryError, RuntimeError)):
             raise error
         again = (self.passes - self._failed) & 0xFFFF <= 1
         self._failures = self._failures + 1 if again else 1

@@ -5,6 +5,7 @@ Names are those of the arm file. What the calls do is done by a ``Work``: the bo
 """
 
 from armtempo_shared.limits import MAX_NAME
+from armtempo_shared.sequence import MAX_COUNTERS
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -73,7 +74,11 @@ if TYPE_CHECKING:
         def say(self, text: str) -> None:
             """Show a text to the host."""
 
+        def will_write(self) -> None:
+            """The program opens a file for writing: nothing of it may be left to write when a motion starts."""
 
+
+TOO_MANY_COUNTERS = "more than %d counters" % MAX_COUNTERS
 _FULL = 65535  # value of an output at the upper end of its range
 _LONGEST_S = 3600.0
 _LEAST_PERCENT = 1
@@ -133,6 +138,7 @@ class Cell:
 
     def start(self, motion: str, speed: float = 1.0) -> None:
         """Start a stored motion; ``wait()`` waits for its end."""
+        _check_name("motion", motion)
         percent = _percent(speed)
         self._rest()
         self._work.begin_motion(motion, percent)
@@ -156,6 +162,7 @@ class Cell:
 
     def pallet(self, name: str) -> "Pallet":
         """A pallet of the arm file; it goes on where the last program left it, unless that was full."""
+        _check_name("pallet", name)
         if name not in self._pallets:
             shape = self._found("pallets", "pallet", name)
             from armtempo_board.app.pallet import Pallet  # here, as most programs have none
@@ -205,7 +212,7 @@ class Cell:
         Returns False if that takes longer than ``timeout_s``; 0: no limit.
         """
         work = self._work
-        number = self._found("inputs", "input", input) if input else -1
+        number = -1 if input == "" else self._found("inputs", "input", input)
         limit_ms = _ms(timeout_s)
         begin_ms = work.ticks_ms()
         while True:
@@ -231,6 +238,7 @@ class Cell:
     def count(self, name: str) -> int:
         """Increment a counter, which 'armtempo status' shows; returns its value."""
         self._work.check()
+        _check_name("counter", name)
         if not 0 < len(name.encode()) <= MAX_NAME:
             raise CellError("count: the name %r has not 1 to %d bytes" % (name, MAX_NAME))
         return self._work.count(name)
@@ -294,11 +302,32 @@ class Cell:
         raise CellError("a posture has %d angles, not %s" % (len(per_deg), given))
 
     def _found(self, kind: str, word: str, name: str) -> "Any":
+        _check_name(word, name)
         found = self._table[kind]
         if name not in found:
             has = "the program's text" if kind in _NAMED else "the arm"
             raise CellError("%s has no %s %r; it has %s" % (has, word, name, _names(found)))
         return found[name]
+
+
+def opener(work: "Work") -> "Any":
+    """``open`` for a program: for writing only at rest, as the chip stands still while its flash is written."""
+
+    def opened(path: str, mode: str = "r", **more: "Any") -> "Any":
+        if mode.strip("rbt"):
+            if work.moving():
+                raise CellError(
+                    "open: %r cannot be written while the arm moves; cell.wait() waits for rest" % path
+                )
+            work.will_write()
+        return open(path, mode, **more)
+
+    return opened
+
+
+def _check_name(word: str, name: "Any") -> None:
+    if not isinstance(name, str):
+        raise CellError("the name of the %s is a text, not %r" % (word, name))
 
 
 def _names(found: "Iterable[str]") -> str:

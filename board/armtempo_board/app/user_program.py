@@ -6,6 +6,7 @@ nothing else is started while it runs.
 
 import gc
 import io
+import os
 import sys
 import time
 
@@ -16,7 +17,7 @@ from micropython import const
 
 import armtempo_board
 from armtempo_board import step_rates
-from armtempo_board.app.cell import Cell, CellError, Ended
+from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended, opener
 from armtempo_board.app.sequence_command import STEP
 from armtempo_board.app.sequencer import Sequencer
 from armtempo_board.code_names import name_of
@@ -53,6 +54,7 @@ class UserProgram(Sequencer):
         self._run_once: "Callable[[], None]" = self.prepare
         self._served_ms: "Any" = 0
         self._skipped = 0
+        self._writes = False  # it has opened a file for writing
         self._percent = _PERCENT  # of the speed, in the present motion
 
     def begin(self) -> None:
@@ -87,6 +89,7 @@ class UserProgram(Sequencer):
         names = {
             "__name__": "__main__",
             "print": self._print,
+            "open": opener(self),
             program.MARK: cell.at,
             program.EACH: cell.each,
         }
@@ -96,11 +99,11 @@ class UserProgram(Sequencer):
         gc.collect()
         before = list(sys.modules)
         armtempo_board.cell = cell
-        self._app.fills_heap = True
+        self._app.runs_program = True
         try:
             exec(code, names)
         finally:
-            self._app.fills_heap = False
+            self._app.runs_program = False
             del armtempo_board.cell
             _forget_modules(before)
 
@@ -115,8 +118,8 @@ class UserProgram(Sequencer):
         try:
             text, line = _traceback(error, self.table["file"])
             self.status[STEP] = line or self.status[STEP]
-        except MemoryError:
-            text = "MemoryError in line %d" % self.status[STEP]
+        except Exception:  # memory is short, or what it printed is no text
+            text = "%s in line %d" % (type(error).__name__, self.status[STEP])
         self._is_said()
         self._app.events.note_failure(text)
 
@@ -200,6 +203,8 @@ class UserProgram(Sequencer):
         self._begin(messages.ONCE_NAME, None, _PERCENT, what, flags)
 
     def _begin(self, name: str, crc: "int | None", percent: int, what: str, flags: int = 0) -> None:
+        if self._writes:
+            os.sync()  # otherwise MicroPython writes its cache later, while the arm moves
         try:
             self._percent = percent
             self._controller.begin_motion(name, crc, self._share(self._rate), flags)
@@ -272,7 +277,7 @@ class UserProgram(Sequencer):
         """Increment a counter."""
         number = self._command.named(name.encode(), MAX_COUNTERS)
         if number < 0:
-            raise CellError("more than %d counters" % MAX_COUNTERS)
+            raise CellError(TOO_MANY_COUNTERS)
         return self._command.count(number)
 
     def say(self, text: str) -> None:
@@ -288,6 +293,10 @@ class UserProgram(Sequencer):
                 if not app.commands.greeted:
                     self._run_once()  # at the REPL ``replay`` shows it; the next host does not get it
                     app.events.notice = b""
+
+    def will_write(self) -> None:
+        """The flash must be at rest when a motion starts."""
+        self._writes = True
 
     def _is_said(self) -> bool:
         """Wait until the text before was sent; returns whether it was."""

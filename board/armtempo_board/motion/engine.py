@@ -152,6 +152,7 @@ class Engine:
         self._watch_idle()
         if self.fault:
             raise Refused(codes.FAULT_PENDING, self.fault_joint, self.fault)
+        moving = _ALL_JOINTS if ready or self.skip_check else self.check_splines(motion)
         override = ready.override if ready else self._override(rate, motion)
         self.rates.begin(override, motion)
         self.clock.set(-self._lead_ticks())
@@ -162,7 +163,7 @@ class Engine:
             if ready:
                 ready.hand_over(number, joint)
             else:
-                joint.load(motion, number)
+                joint.load(motion, number, moving >> number & 1)
                 if rate != _PERMILLE:
                     joint.follow(override.law, False)
             now_kiticks = self.clock.kiticks()
@@ -178,9 +179,7 @@ class Engine:
         return max(_SHORT_LEAD_TICKS, max([joint.gap_ticks for joint in self.drives]))
 
     def _override(self, rate: int, motion: "MotionHead") -> "Any":
-        """Check the motion; returns its time law."""
-        if not self.skip_check:
-            self.check_splines(motion)
+        """Check where the motion starts and how long it takes; returns its time law."""
         self._check_start(motion)
         if self._is_short:
             gc.collect()
@@ -190,10 +189,10 @@ class Engine:
             raise Refused(codes.TOO_LONG)
         return override
 
-    def check_splines(self, motion: "MotionHead") -> None:
-        """Check the splines of a motion; raises Refused."""
+    def check_splines(self, motion: "MotionHead") -> int:
+        """Check the splines of a motion; raises Refused. Returns one bit per joint that does not stand."""
         joint = self.drives[0]  # any one, as the gap is the same for all; it walks through the motion
-        motion_check.check(motion, self.limits, joint.gap_ticks, joint.generator.subintervals)
+        return motion_check.check(motion, self.limits, joint.gap_ticks, joint.generator.subintervals)
 
     def _check_start(self, motion: "MotionHead") -> None:
         """Raise Refused if the motion does not start where the joints are."""

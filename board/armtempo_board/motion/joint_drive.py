@@ -86,9 +86,10 @@ class JointDrive:
         self._base_steps = 0
         self._reversals_in = self._reversals_out = 0
 
-    def load(self, motion: "MotionHead", number: int) -> None:
-        """Prepare for a motion; the clock is before 0."""
-        self.generator.load(motion, number, self._base, self._sampler.block[isr.PULSE_TICKS], self.gap_ticks)
+    def load(self, motion: "MotionHead", number: int, moves: int) -> None:
+        """Prepare for a motion; the clock is before 0. ``moves``: as of ``StepGenerator.load``."""
+        pulse_ticks = self._sampler.block[isr.PULSE_TICKS]
+        self.generator.load(motion, number, self._base, pulse_ticks, self.gap_ticks, moves)
         self.prepare_start()
 
     def prepare_start(self) -> None:

@@ -52,8 +52,8 @@ def check(
     joints: "list[dict[str, int]]",
     gap_ticks: int,
     interval: "Subintervals",
-) -> None:
-    """Raise Refused for the first error, with the joint and a value.
+) -> int:
+    """Raise Refused for the first error, with the joint and a value. Returns one bit per joint that does not stand.
 
     ``joints``: the joints' rows of the arm record; ``gap_ticks``: see ``StepGenerator.load``. ``interval``:
     reused for the walk through the motion, to save heap. The value is, by code: time_order, the control
@@ -72,6 +72,7 @@ def check(
             else:
                 _check_standing(motion, joints[joint], joint)
         rate_check.check_sum(motion, joints, moving, interval)
+        return moving
     finally:
         interval.close()
 

@@ -127,10 +127,21 @@ class StepGenerator:
         self._found = _NOT_YET  # what is known of the next subinterval
 
     def load(
-        self, motion: "MotionHead", joint: int, position_steps: int, pulse_ticks: int, gap_ticks: int
+        self,
+        motion: "MotionHead",
+        joint: int,
+        position_steps: int,
+        pulse_ticks: int,
+        gap_ticks: int,
+        moves: int = 1,
     ) -> None:
-        """Stand at the first step of a motion; as ``begin``."""
+        """Stand at the first step of a motion; as ``begin``.
+
+        ``moves``: 0 if the joint is known to stand, all its control points being equal. If it stands at its position,
+        no step is looked for, which would take as long as the check of a joint.
+        """
         self.begin(motion, joint, position_steps, pulse_ticks, gap_ticks)
+        self.ended = not moves and self.subintervals.end_steps() == position_steps
         while self.seek():
             pass
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import math
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, wraps
 from itertools import chain, repeat
-from numbers import Integral, Real
 from operator import call
 from types import UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
@@ -17,6 +15,7 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 import numpy as np
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.kinds import is_number, is_text, is_whole
 from armtempo.basics.text import hidden
 
 T = TypeVar("T")
@@ -134,23 +133,6 @@ def _check(kind: Any) -> Callable[[object], bool]:
     return lambda value: isinstance(value, origin)
 
 
-def _is_whole(value: object) -> bool:
-    return isinstance(value, Integral) and not isinstance(value, bool)
-
-
-def _is_number(value: object) -> bool:
-    if type(value) is float:
-        return math.isfinite(value)
-    try:
-        return isinstance(value, Real) and not isinstance(value, bool) and abs(float(value)) < float("inf")
-    except OverflowError:
-        return False
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str) and (value.isprintable() or not value)
-
-
 def _are_numbers(value: object) -> bool:
     try:
         array = np.asarray(value)
@@ -165,9 +147,9 @@ _PLAIN: dict[Any, Callable[[object], bool]] = {
     None: lambda value: value is None,
     type(None): lambda value: value is None,
     bool: lambda value: type(value).__name__ in ("bool", "bool_"),
-    int: _is_whole,
-    float: _is_number,
-    str: _is_text,
+    int: is_whole,
+    float: is_number,
+    str: is_text,
 }
 
 

@@ -7,8 +7,6 @@ its default, or the value that had been meant.
 from __future__ import annotations
 
 import dataclasses
-import math
-import sys
 import types
 from collections.abc import Callable, Mapping
 from typing import Any, Union, get_args, get_origin, get_type_hints
@@ -16,6 +14,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from armtempo.basics.errors import InputError
+from armtempo.basics.kinds import is_number, is_whole
 from armtempo.basics.text import did_you_mean, visible
 
 _AGAIN = "restore the file from a copy, or make it again with the command that wrote it"
@@ -64,11 +63,11 @@ def decode(kind: Any, value: Any, where: str) -> Any:
 
 
 def _plain(kind: Any, value: Any, where: str) -> Any:
-    if kind is float and type(value) is int and abs(value) <= sys.float_info.max:
+    if kind is float and is_whole(value) and is_number(value):
         return float(value)
     if type(value) is not (types.NoneType if kind is None else kind):
         raise InputError(f"{where}: {_short(value)} should be {_name(kind)}", _AGAIN)
-    if type(value) is float and not math.isfinite(value):
+    if kind is float and not is_number(value):
         raise InputError(f"{where}: {value} is not a finite number", _AGAIN)
     if type(value) is str and visible(value) != value:
         raise InputError(f"{where}: {_short(value)} has control characters", _AGAIN)

@@ -27,6 +27,8 @@ class NumberTable:
     header: list[str] | None
     rows: list[tuple[int, list[str]]]
     """Line number from 1, and its cells."""
+    units: list[str] | None = None
+    """Of each column, without brackets, in the line below the header; None without such a line."""
 
     def numbers(self, columns: list[int]) -> list[list[float]]:
         """These columns of every row; raises InputError, with line and value, for a cell that is no finite number."""
@@ -58,8 +60,9 @@ def of_text(text: str, path: Path | str, units: Collection[str] = ()) -> NumberT
 
     A first line without a number is a header; so is the last line with ``#`` above the numbers, if it has as many names
     as they have columns. A header may have other separators than the numbers; between blanks, a number, a word in
-    brackets or one of ``units`` belongs to the name before it. Raises InputError if the text is not a table, for a
-    first line of words and numbers, and for a line with more or fewer cells than the first one, or the header.
+    brackets or one of ``units`` belongs to the name before it. A line below it may name the units of the columns.
+    Raises InputError if the text is not a table, for a first line of words and numbers, and for a line with more or
+    fewer cells than the first one, or the header.
     """
     lines = text.removeprefix("\ufeff").splitlines()
     try:
@@ -75,9 +78,18 @@ def of_text(text: str, path: Path | str, units: Collection[str] = ()) -> NumberT
         number, header = rows.pop(0)
         if rows and len(_trimmed(header)) != len(_trimmed(rows[0][1])):
             header = _names(lines[number - 1], separator, len(_trimmed(rows[0][1])), units) or header
+    below = None
+    if header and rows and _are_units(rows[0][1], units):
+        number, cells_below = rows.pop(0)
+        below = _bare(_fitted(cells_below, len(_trimmed(header)), f"{path}: line {number}"))
     above = [number for number, _ in remarks if rows and number < rows[0][0]]
     if header is None and above:
-        header = _names(lines[above[-1] - 1].lstrip("# \t"), separator, len(rows[0][1]), units)
+        remarked = [
+            _names(lines[n - 1].lstrip("# \t"), separator, len(rows[0][1]), units) for n in above[-2:]
+        ]
+        header = remarked.pop()
+        if header and remarked and remarked[0] and _are_units(header, units):
+            header, below = remarked[0], _bare(header)
     header = header and _trimmed(header)
     width = len(header) if header is not None else len(rows[0][1]) if rows else 0
     if header and rows and not len(_trimmed(rows[0][1])) <= width <= len(rows[0][1]):
@@ -93,7 +105,7 @@ def of_text(text: str, path: Path | str, units: Collection[str] = ()) -> NumberT
             f"{path}: line {rows[0][0]}: {words[0]!r} is no number, but others in the line are",
             "correct it; a header has names only",
         )
-    return NumberTable(path, header, rows)
+    return NumberTable(path, header, rows, below)
 
 
 def _separator(lines: list[str]) -> str:
@@ -153,6 +165,15 @@ def _joined(words: list[str], units: Collection[str]) -> list[str]:
         else:
             names.append(word)
     return names
+
+
+def _are_units(row: list[str], units: Collection[str]) -> bool:
+    """Whether a line names units: no numbers, and at least one of ``units``."""
+    return not any(map(is_number, row)) and any(word.lower() in units for word in _bare(row))
+
+
+def _bare(row: list[str]) -> list[str]:
+    return [cell.strip("[]() ") for cell in row]
 
 
 def _trimmed(row: list[str]) -> list[str]:

@@ -7,11 +7,6 @@ import textwrap
 from collections.abc import Iterable, Sequence
 
 
-def is_plain(text: str) -> bool:
-    """Whether a name has only printable characters: no control, format or line-breaking characters."""
-    return text.isprintable()
-
-
 def hidden(text: str) -> str:
     """The first character that is not printable, as "U+202E"; "" if all are."""
     return next((f"U+{ord(char):04X}" for char in text if not char.isprintable()), "")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import reprlib
-import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import Any
 
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError
-from armtempo.basics.text import did_you_mean, is_plain, misspelt, on_one_line
+from armtempo.basics.kinds import is_number, is_text, is_whole
+from armtempo.basics.text import did_you_mean, misspelt, on_one_line
 
 _REQUIRED: Any = object()
 
@@ -127,7 +127,7 @@ class Table:
         """A finite number with ``least`` <= value <= ``most``."""
         allowed = "a number" + _range_text(least, most)
         value = self._get(key, default, allowed)
-        if not _is_number(value) or not (least <= value <= most):
+        if not is_number(value) or not (least <= value <= most):
             raise self.fail(key, allowed)
         return float(value)
 
@@ -135,9 +135,9 @@ class Table:
         """A whole number from ``least`` to ``most``."""
         allowed = f"a whole number from {least} to {most}"
         value = self._get(key, default, allowed)
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        if not is_whole(value) or not least <= value <= most:
             raise self.fail(key, allowed)
-        return value
+        return int(value)
 
     def choice(
         self, key: str, choices: Sequence[Any], default: Any = _REQUIRED, allowed: str | None = None
@@ -158,7 +158,7 @@ class Table:
         value = self._get(key, default, "a text")
         if not isinstance(value, str) or not value.strip():
             raise self.fail(key, "a text that is not empty")
-        if not is_plain(value):
+        if not is_text(value):
             raise self.fail(key, "a text on one line, without control characters")
         return value
 
@@ -168,7 +168,7 @@ class Table:
         """A list of ``count`` finite numbers from -``most`` to ``most``."""
         allowed = f"a list of {count} numbers" + (f" from {-most:g} to {most:g}" if most < math.inf else "")
         value = self._get(key, default, allowed)
-        if not isinstance(value, list | tuple) or len(value) != count or not all(map(_is_number, value)):
+        if not isinstance(value, list | tuple) or len(value) != count or not all(map(is_number, value)):
             raise self.fail(key, allowed)
         if any(abs(number) > most for number in value):
             raise self.fail(key, allowed)
@@ -229,13 +229,6 @@ class Table:
                 f"{self.file}: {self.place}{on_one_line(key)}: unknown key",
                 f"{meant} {known}" if meant else known,
             )
-
-
-def _is_number(value: Any) -> bool:
-    """Whether it is a finite number, and no integer beyond the largest double."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return abs(value) <= sys.float_info.max
 
 
 def _range_text(least: float, most: float) -> str:

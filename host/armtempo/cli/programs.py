@@ -18,6 +18,7 @@ from armtempo.encoding import encoded_program
 from armtempo.encoding.encoded_program import EncodedProgram
 from armtempo.model.arm import Arm
 from armtempo.model.user_program import UserProgram
+from armtempo.planning import workspace_check
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
 
@@ -116,6 +117,8 @@ def _show_check(encoded: EncodedProgram, as_json: bool) -> None:
         lines.append(f"on the way from above a place to it the tool is up to {beside}")
     if found.homes:
         lines.append("it homes the arm itself, so that it may be started before that")
+        if workspace_check.can_touch(encoded.arm):
+            lines.append("its ways to the switches are not checked against the workspace: it begins anywhere")
     lines += [f"must be on the board: {name}" for name in values["not_beside_it"]]
     results.show(as_json, values, lines)
 

@@ -44,7 +44,7 @@ _IN_FIRMWARE = (
     *(f"{PACKAGES[0]}.app.{name}" for name in ("cell", "homing", "pallet", "program_start", "user_program")),
     *(f"{PACKAGES[0]}.storage.{name}" for name in ("sequence_file", "program_file", "measured_rates")),
     *(f"{PACKAGES[1]}.sequence{name}" for name in ("", "_check")),
-    *(f"{PACKAGES[1]}.{name}" for name in ("program", "rest_to_rest", "shapes")),
+    *(f"{PACKAGES[1]}.{name}" for name in ("homing", "program", "rest_to_rest", "shapes")),
     *(f"{PACKAGES[0]}.app.sequence{name}" for name in ("_ahead", "_command", "_start", "r")),
 )
 _PACKAGE_IN_FIRMWARE = f"{PACKAGES[0]}.selftest"

@@ -8,7 +8,7 @@ import numpy as np
 
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.diagnosis import drives, figures, geometry, torque, units, wiring
-from armtempo.diagnosis.finding import Finding, Level, error, note
+from armtempo.diagnosis.finding import Finding, Level, error, note, warning
 from armtempo.model.arm import STILL_DEG, Arm
 from armtempo.model.posture import HOME
 
@@ -60,8 +60,8 @@ def _postures(arm: Arm) -> list[Finding]:
 
 
 def _touching(arm: Arm) -> list[Finding]:
-    """Findings about touching parts in the home posture and the named postures."""
-    from armtempo.planning import via_points, workspace_check  # here, as above
+    """Findings about touching parts in the home posture, the named postures, and on the ways to the switches."""
+    from armtempo.planning import homing_check, via_points, workspace_check  # here, as above
 
     found = []
     for posture in (arm.posture(HOME), *arm.postures):
@@ -76,6 +76,16 @@ def _touching(arm: Arm) -> list[Finding]:
                 "correct the posture, [workspace] or radius_mm",
             )
             for touch in workspace_check.posture_touches(arm, angles)
+        ]
+    if not found:
+        found += [
+            warning(
+                "homing",
+                f"a way {problem}",
+                "home other joints first ('homing' in the arm file), or put the switch at the other end; nothing "
+                "checks the ways of homing while it moves",
+            )
+            for problem in homing_check.touching(arm)
         ]
     return found
 

@@ -26,7 +26,7 @@ def findings(arm: Arm, path: Path) -> list[Finding]:
         arm = arm.with_tool(job.tool)
         suspected = _units(arm, job)
         checks.check_job(arm, job)
-        via_deg, notes = planner.via_angles(arm, job)
+        job, via_deg, notes = planner.points_of(arm, job)
     except ArmtempoError as refused:
         text = "correct that; the rest of the job was not checked"
         return [*suspected, error("job", str(refused), text)]
@@ -74,9 +74,9 @@ def _steps(arm: Arm, via_deg: Array) -> list[Finding]:
     """Findings about joints that move by less than a step."""
     found = []
     for joint, angles in zip(arm.driven, via_deg.T, strict=True):
-        way_deg = float(np.ptp(angles))
-        if 0.0 < way_deg * joint.steps_per_deg < 1.0:
-            text = f"{joint.name} is to move by {way_deg:.2g} {joint.unit.name}, less than a step"
+        move_deg = float(np.ptp(angles))
+        if 0.0 < move_deg * joint.steps_per_deg < 1.0:
+            text = f"{joint.name} is to move by {move_deg:.2g} {joint.unit.name}, less than a step"
             unit = "its positions are mm" if joint.slides else "angles are degrees"
             found.append(warning("job", text, f"check the unit: {unit}; it will not move, or make one step"))
     return found

@@ -25,7 +25,7 @@ from armtempo.model.parts import DrivenJoint
 from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME
 from armtempo.model.user_program import UserProgram
-from armtempo.planning import pallet_places, point_to_point, via_points, workspace_check
+from armtempo.planning import homing_check, pallet_places, point_to_point, via_points, workspace_check
 
 Places = dict[str, dict[str, list[tuple[Array, Array]]]]
 """By pallet and tool: the driven joints' angles above each place and at it, degrees, (J,) each."""
@@ -133,17 +133,8 @@ def _homing(arm: Arm) -> dict[str, Any]:
 
 
 def _home_switch(joint: DrivenJoint, number: int, switch: HomeSwitch) -> list[int]:
-    whole = (
-        switch.trip_deg,
-        switch.edge_deg,
-        switch.span_deg,
-        switch.farthest_deg,
-        switch.away_deg,
-        home_switches.BACK_DEG,
-        home_switches.MOST_PRESSED_DEG,
-        home_switches.TOLERANCE_DEG,
-    )
-    return [number, switch.side, *(round(each * joint.steps_per_deg) for each in whole)]
+    _, side, *lengths_deg = switch.row(number)
+    return [number, int(side), *(round(each * joint.steps_per_deg) for each in lengths_deg)]
 
 
 def _others(bare: dict[str, list[int]], now: dict[str, list[int]]) -> dict[str, list[int]]:
@@ -229,10 +220,10 @@ def moves_that_touch(found: EncodedProgram) -> list[str]:
     """What is wrong with straight moves between the postures that the program names and the ends of its motions.
 
     And with those between them and what is above the places of its pallets, and from there to the places: with each
-    tool that it names, and without. The board knows nothing of the workspace; which of these moves the program makes is
-    not known either.
+    tool that it names, and without; and with the ways to the switches, if it homes the arm. The board knows nothing of
+    the workspace; which of these moves the program makes is not known either.
     """
-    problems = []
+    problems = homing_check.touching(found.arm) if found.program.homes else []
     for tool in ("", *found.program.tools):
         arm = found.arm.with_tool(tool)
         if workspace_check.can_touch(arm):

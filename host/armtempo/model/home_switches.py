@@ -75,6 +75,11 @@ class HomeSwitch:
         """Distance by which it is left at last, into the range."""
         return BACK_DEG + self.outside_deg
 
+    def row(self, joint: int) -> tuple[int | float, ...]:
+        """Of a joint, from 0, for ``armtempo_shared.homing``; in degrees, or mm of a sliding one."""
+        ends = self.trip_deg, self.edge_deg, self.span_deg, self.farthest_deg, self.away_deg
+        return joint, self.side, *ends, BACK_DEG, MOST_PRESSED_DEG, TOLERANCE_DEG
+
 
 def groups(arm: HomedArm) -> list[dict[int, HomeSwitch]]:
     """Joints (from 0, among the driven ones) that are homed together, in order, with their switches."""

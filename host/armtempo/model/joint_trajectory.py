@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, MissingPackageError
+from armtempo.basics.kinds import is_number
 from armtempo.model import table_header
 from armtempo.model.arm import Arm
 from armtempo.model.exchange import from_si
@@ -174,9 +174,9 @@ def _entry(point: Any, number: int, path: Path | str) -> Mapping[str, Any]:
 def _time_s(point: Mapping[str, Any], number: int, path: Path | str) -> float:
     given = point.get("time_from_start")
     if isinstance(given, Mapping):
-        if given and given.keys() <= _TIMES_S.keys() and all(map(_is_number, given.values())):
+        if given and given.keys() <= _TIMES_S.keys() and all(map(is_number, given.values())):
             return sum(float(value) * _TIMES_S[key] for key, value in given.items())
-    elif given is not None and _is_number(given):
+    elif given is not None and is_number(given):
         return float(given)
     raise InputError(
         f"{path}: point {number}: time_from_start {given!r} is no time", "give {sec: …, nanosec: …}"
@@ -185,16 +185,12 @@ def _time_s(point: Mapping[str, Any], number: int, path: Path | str) -> float:
 
 def _numbers(point: Mapping[str, Any], key: str, count: int, number: int, path: Path | str) -> list[float]:
     given = point.get(key)
-    if not isinstance(given, Sequence) or len(given) != count or not all(map(_is_number, given)):
+    if not isinstance(given, Sequence) or len(given) != count or not all(map(is_number, given)):
         raise InputError(
             f"{path}: point {number}: {key} must be {count} numbers, one for each of joint_names",
             "correct the point",
         )
     return [float(value) for value in given]
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _between(times: Array, angles: Array, speeds: Array) -> tuple[Array, Array]:

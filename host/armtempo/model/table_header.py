@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
@@ -33,6 +34,7 @@ _ANGLE = {
 }
 _LENGTH = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
 _DURATION = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+_NO_UNIT = "-"
 UNITS = frozenset({**_ANGLE, **_LENGTH, **_DURATION})
 """Words that may say the unit of a column after its name."""
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
@@ -128,6 +130,19 @@ def read(names: Sequence[str], arm: Arm, where: str) -> Header:
         raise InputError(f"{where}: {other!r} is not known as part of a pose", f"leave it out, or {hint}")
     _check_orientation([key for key in pose if key not in POSITION], where)
     return Header(pose=pose, time=time)
+
+
+def with_units(names: Sequence[str], units: Sequence[str], where: str) -> list[str]:
+    """The names with the units of the line below them; InputError if a name has another one."""
+    found = []
+    for name, unit in zip_longest(names, units[: len(names)], fillvalue=""):
+        base, own = _split(name)
+        if own in UNITS and unit.lower() not in ("", _NO_UNIT, own):
+            raise InputError(
+                f"{where}: {name!r} is in {unit} by the line below", "leave one of the two units out"
+            )
+        found.append(f"{base} ({unit})" if own not in UNITS and unit not in ("", _NO_UNIT) else name)
+    return found
 
 
 def _check_orientation(keys: list[str], where: str) -> None:

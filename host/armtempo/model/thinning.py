@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
+from armtempo.model import point_groups
 from armtempo.model.joint_unit import DEG, JointUnit
 from armtempo.splines import bspline, extremes
 from armtempo.splines.bspline import REST_PIECES
@@ -85,6 +86,7 @@ def thinned(
     times_s: Array | None = None,
     ranges_deg: Array | None = None,
     unit_words: str = DEG.word,
+    steps: Callable[[Array], Array] | None = None,
 ) -> Thinned:
     """Via points such that the spline through them (degree 5, shared timing) and the points' polyline are near.
 
@@ -92,6 +94,7 @@ def thinned(
     largest over the joints. ``points_deg``: (n, J); ``times_s``: (n,), increasing; with times, rests are kept.
     ``ranges_deg``: (J, 2), which the spline keeps if the points do, by a path that is a little inside where it would
     swing out; points beyond them by less than half of the tolerance, as recordings have them, count as at their ends.
+    ``steps``: the motors' positions (n, J) of points; no two via points of a leg are then less than a step apart.
     Raises InputError for a tolerance outside (0, LARGEST_DEG], points that do not move, and if more via points are
     needed than a motion can have.
     """
@@ -112,7 +115,7 @@ def thinned(
         lines = [
             _Polyline.of(np.clip(points, low + inside[0], high - inside[1]), times) for points, times in legs
         ]
-        places = [_enough(line, wanted, unit_words) for line in lines]
+        places = [_apart(line, _enough(line, wanted, unit_words), steps) for line in lines]
         via = [line.at(place) for line, place in zip(lines, places, strict=True)]
         whole = _whole(via)
         off_deg = _off_whole(whole, lines, places) + float(inside.max()) + beyond_deg
@@ -123,7 +126,7 @@ def thinned(
         wanted *= 0.5
     else:
         raise InputError(
-            f"its rests and the ends of ranges cannot be kept within {tolerance_deg:g} {unit_words}",
+            f"its rests, slow parts and the ends of ranges cannot be kept within {tolerance_deg:g} {unit_words}",
             "allow more with --tolerance-deg or --tolerance-mm",
         )
     numbers = np.cumsum([len(each) - 1 for each in via]).tolist()
@@ -225,6 +228,14 @@ def _enough(line: _Polyline, tolerance_deg: float, unit_words: str) -> Array:
                 f"more than {MAX_SEGMENTS + 1} via points are needed to keep within {tolerance_deg:g} {unit_words}",
                 "allow more with --tolerance-deg or --tolerance-mm, or cut the table into several motions",
             )
+
+
+def _apart(line: _Polyline, places: Array, steps: Callable[[Array], Array] | None) -> Array:
+    """The places without those less than a step beside another, which the planner takes for one."""
+    if steps is None:
+        return places
+    found = point_groups.groups(steps(line.at(places)))
+    return places[[point_groups.kept(group, len(places) - 1) for group in found]]
 
 
 def _halved(places: Array, which: NDArray[np.bool_]) -> Array:

@@ -1,8 +1,8 @@
 """A user's program for the board (``cell``): read, checked against an arm, and marked with its lines.
 
 The board has no way to ask where a program is. So its source gets marks before it is sent: in each call of the cell and
-in the head of each loop, by which the board also does its own work in a loop that calls nothing. Lines stay as they
-are.
+in the head of each loop and comprehension, by which the board also does its own work in one that calls nothing. Lines
+stay as they are.
 """
 
 from __future__ import annotations
@@ -21,13 +21,12 @@ from armtempo_shared.sequence import MAX_COUNTERS
 from armtempo.basics import number_table
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
-from armtempo.model import home_switches
+from armtempo.model import home_switches, program_calls
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
 from armtempo.model.parts import NOTHING
 
 _PACKAGE, _CELL = "armtempo_board", "cell"
-_SLEEPS = ("sleep", "sleep_ms")
 _CALLS = {name: value for name, value in vars(Cell).items() if not name.startswith("_")}
 _INTERNAL = ("at", "each")
 
@@ -122,11 +121,15 @@ class _Reader:
                 self._known(node)
             if isinstance(node, ast.Import | ast.ImportFrom):
                 self._check_import(node)
-            if isinstance(node, ast.Call):
-                if isinstance(node.func, ast.Attribute) and _is_name(node.func.value, self.cell):
-                    self._known(node.func)
-                    self._check(node, node.func.attr)
-                self._check_sleep(node)
+            if (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Attribute)
+                and _is_name(node.func.value, self.cell)
+            ):
+                self._known(node.func)
+                self._check(node, node.func.attr)
+        for found in program_calls.problems(tree, self.arm, self.cell):
+            raise InputError(f"{self.path}, line {found.line}: {found.what}", found.next_step)
         if len(self.counters) > MAX_COUNTERS:
             raise InputError(f"{self.path}: {len(self.counters)} counters", f"use at most {MAX_COUNTERS}")
 
@@ -209,23 +212,6 @@ class _Reader:
                     f"write what it needs of {name}.py into this file",
                 )
 
-    def _check_sleep(self, node: ast.Call) -> None:
-        """The board does nothing else while MicroPython's sleep lasts, or ``input`` waits: no steps of a motion."""
-        if _is_name(node.func, "input"):
-            raise InputError(
-                f"{self._place(node)}input() waits for a terminal, which the board does not have",
-                f"wait for an input of the arm file: {self.cell}.wait(name)",
-            )
-        if (
-            isinstance(node.func, ast.Attribute)
-            and node.func.attr in _SLEEPS
-            and (_is_name(node.func.value, "time") or _is_name(node.func.value, "utime"))
-        ):
-            raise InputError(
-                f"{self._place(node)}time.{node.func.attr} keeps the board from its work",
-                f"write {self.cell}.sleep(seconds)",
-            )
-
 
 def _valid(name: str) -> str:
     if not is_name(name):
@@ -258,8 +244,8 @@ class _Marks:
                     self._around(node.func.value, f"{MARK}({node.lineno}, ", ")")
             elif isinstance(node, ast.While):
                 self._around(node.test, f"{MARK}({node.lineno}) and (", ")")
-            elif isinstance(node, ast.For):
-                self._around(node.iter, f"{EACH}({node.lineno}, (", "))")
+            elif isinstance(node, ast.For) or (isinstance(node, ast.comprehension) and not node.is_async):
+                self._around(node.iter, f"{EACH}({node.iter.lineno}, (", "))")
         for line, at, _, text in sorted(self._texts, reverse=True):
             row = self._lines[line - 1]
             self._lines[line - 1] = row[:at] + text + row[at:]

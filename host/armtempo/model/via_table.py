@@ -169,7 +169,14 @@ def _thinned(
     scale = tolerance.scale
     ranges = np.array([joint.range_deg for joint in arm.driven]) / scale[:, None]
     words = DEG.word if np.any(scale != 1.0) else arm.texts.unit_words
-    found = thinning.thinned(angles / scale, tolerance.one, times_s, ranges, words)
+    found = thinning.thinned(
+        angles / scale,
+        tolerance.one,
+        times_s,
+        ranges,
+        words,
+        lambda points: arm.transmission.steps(points * scale),
+    )
     for place, left_out_s in zip(("beginning", "end"), found.left_out_s, strict=True):
         if left_out_s:
             notes += (f"{left_out_s:.3g} s of rest at the {place} are left out",)
@@ -218,7 +225,9 @@ def _value(value: Sequence[float] | float) -> str:
 
 def _header(table: NumberTable, arm: Arm) -> Header:
     if table.header is not None:
-        return table_header.read(table.header, arm, f"{table.path}: line 1")
+        where = f"{table.path}: line 1"
+        names = table_header.with_units(table.header, table.units or (), where)
+        return table_header.read(names, arm, where)
     columns = len(table.rows[0][1]) if table.rows else len(arm.driven)
     for least in (0, 1):
         if columns > 1 and table.rows and table.rows[0][1] == [str(least + n) for n in range(columns)]:

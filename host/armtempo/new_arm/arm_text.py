@@ -125,7 +125,7 @@ def _joint(row: DhRow, chain: Chain, frame: Array, first: bool, radius_mm: float
     else:
         note = "continuous in the URDF: widen it if the cables allow" if joint.continuous else ""
         if joint.narrowed_by:
-            note = f"by the limits of {_one_line(joint.narrowed_by)}, which its linkage turns"
+            note = f"by {_one_line(joint.narrowed_by)}"
         text = _row_text(name, row, _inside(joint.range_deg), note, radius_mm, joint.unit)
     if any(each.body for each in chain.joints):
         text += _dynamics(joint.body.in_frame(frame) if joint.body else Dynamics(0.0), joint.unit)

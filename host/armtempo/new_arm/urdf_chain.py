@@ -37,7 +37,7 @@ class ChainJoint:
     """Whether a linkage turns it by minus the angle of the joint before, so that its link keeps its direction."""
     slides: bool = False
     narrowed_by: str = ""
-    """Name of the joint that a linkage turns with this one, and whose limits are narrower."""
+    """What makes its range narrower than its own limits."""
 
     @property
     def unit(self) -> JointUnit:
@@ -85,8 +85,8 @@ class Chain:
     def narrowed(self) -> tuple[str, ...]:
         """What is said of ranges that are narrower than in the file."""
         return tuple(
-            f"joint {joint.name!r}: its range is {joint.range_deg[0]:.5g} to {joint.range_deg[1]:.5g} degrees, by the "
-            f"limits of {joint.narrowed_by!r}, which it turns"
+            f"joint {joint.name!r}: its range is {joint.range_deg[0]:.5g} to {joint.range_deg[1]:.5g} "
+            f"{joint.unit.word}, by {joint.narrowed_by}"
             for joint in self.joints
             if joint.narrowed_by
         )

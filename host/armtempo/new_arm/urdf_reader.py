@@ -15,7 +15,7 @@ import numpy as np
 
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, MissingPackageError
-from armtempo.new_arm import urdf_bodies, urdf_refusals, urdf_tip, urdf_transmissions
+from armtempo.new_arm import urdf_bodies, urdf_limits, urdf_refusals, urdf_tip, urdf_transmissions
 from armtempo.new_arm.urdf_chain import MM, Chain, ChainJoint, transform
 from armtempo.new_arm.urdf_refusals import SLIDING
 
@@ -60,7 +60,9 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     couplings, unclear = urdf_transmissions.of_file(path, names)
     zero = transform(model, last, first)
     doubtful = _doubtful_origins(root, {joint.name for joint in joints})
-    return Chain(model.robot.name, first, last, found, zero, model, couplings, (*unclear, *doubtful))
+    unread = [text for text in map(urdf_limits.unread, moving) if text]
+    unclear = (*unclear, *doubtful, *unread)
+    return Chain(model.robot.name, first, last, found, zero, model, couplings, unclear)
 
 
 def _reader() -> Any:
@@ -158,12 +160,15 @@ def _joint(model: Any, base: str, joint: Any, after: Any) -> ChainJoint:
     frame = transform(model, joint.child, base)
     axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis, dtype=np.float64)
     limit, continuous, slides = joint.limit, joint.type == "continuous", joint.type == SLIDING
+    low_high, narrowed_by = CONTINUOUS_DEG, ""
     if joint.mimic is not None:
         low_high = (0.0, 0.0)
-    elif slides:
-        low_high = (MM * limit.lower, MM * limit.upper)
-    else:
-        low_high = CONTINUOUS_DEG if continuous else (math.degrees(limit.lower), math.degrees(limit.upper))
+    elif (ends := urdf_limits.ends(joint)) is not None:
+        low_high = (
+            (MM * ends.low, MM * ends.high) if slides else (math.degrees(ends.low), math.degrees(ends.high))
+        )
+        narrowed_by = urdf_limits.SOFT if ends.are_soft else ""
+        continuous = False
     speed = None
     if limit is not None and limit.velocity:
         speed = MM * limit.velocity if slides else math.degrees(limit.velocity)
@@ -171,7 +176,7 @@ def _joint(model: Any, base: str, joint: Any, after: Any) -> ChainJoint:
     body = urdf_bodies.of_joint(model, base, joint, after)
     is_linked = joint.mimic is not None
     return ChainJoint(
-        joint.name, frame[:3, 3], direction, low_high, speed, continuous, body, is_linked, slides
+        joint.name, frame[:3, 3], direction, low_high, speed, continuous, body, is_linked, slides, narrowed_by
     )
 
 
@@ -179,13 +184,11 @@ def _narrowed(path: Path, moving: Sequence[Any], found: Iterable[ChainJoint]) ->
     """The joints, those that turn others by a linkage within the limits of these too."""
     joints = list(found)
     for number, joint in enumerate(moving):
-        limit = joint.limit
-        if joint.mimic is None or joint.type == "continuous" or limit is None:
-            continue
-        if limit.lower is None or limit.upper is None:
+        ends = urdf_limits.ends(joint) if joint.mimic is not None else None
+        if ends is None:
             continue
         offset, before = joint.mimic.offset or 0.0, joints[number - 1]
-        low, high = (math.degrees(offset - end) for end in (limit.upper, limit.lower))
+        low, high = (math.degrees(offset - end) for end in (ends.high, ends.low))
         kept = max(low, before.range_deg[0]), min(high, before.range_deg[1])
         if not kept[0] < kept[1]:
             raise InputError(
@@ -193,5 +196,6 @@ def _narrowed(path: Path, moving: Sequence[Any], found: Iterable[ChainJoint]) ->
                 f"correct the limits of one of them; {joint.name!r} may do without",
             )
         if kept != before.range_deg:
-            joints[number - 1] = replace(before, range_deg=kept, continuous=False, narrowed_by=joint.name)
+            by = f"the limits of {joint.name!r}, which its linkage turns"
+            joints[number - 1] = replace(before, range_deg=kept, continuous=False, narrowed_by=by)
     return tuple(joints)

@@ -41,6 +41,8 @@ _FIRST = -1.5
 _FIRST_TIMES = np.abs(np.arange(4) + _FIRST)
 _LEAST_CRUISE = 9
 """In h; with a shorter one all intervals are equal."""
+_SHORTEST_CRUISE = 0.01
+"""In h: what is left for constant speed between the ramps."""
 _GROWTH = 3.0
 """Largest ratio of neighbouring intervals."""
 _LONGEST_S = 100.0
@@ -132,10 +134,9 @@ def law(length: float, limits: MoveLimits, longest: float = math.inf) -> MoveLaw
     h = limits.step_s(limits.speed, longest)
     lift = limits.lift(h, limits.speed)
     ramp_s = limits.ramp_s(limits.speed + lift)
-    if length > ramp_s * (limits.speed - lift) + _LEAST_CRUISE * h * limits.speed:
-        speeds, steps_s = _with_cruise(length, limits, h, longest)
-    else:
-        speeds, steps_s = _in_equal_steps(length, limits, longest)
+    is_long = length > ramp_s * (limits.speed - lift) + _LEAST_CRUISE * h * limits.speed
+    found = _with_cruise(length, limits, h, longest) if is_long else None
+    speeds, steps_s = found or _in_equal_steps(length, limits, longest)
     distance = np.append(0.0, (speeds * steps_s).cumsum())
     times = np.append(0.0, steps_s.cumsum())
     weights = bspline.basis(DEGREE)[0, :-1]
@@ -148,8 +149,11 @@ def law(length: float, limits: MoveLimits, longest: float = math.inf) -> MoveLaw
     return MoveLaw(distance * scale, times * slower)
 
 
-def _with_cruise(length: float, limits: MoveLimits, h: float, longest: float) -> tuple[Array, Array]:
-    """Control points of the speed, and the intervals, of a law with constant speed in the middle."""
+def _with_cruise(length: float, limits: MoveLimits, h: float, longest: float) -> tuple[Array, Array] | None:
+    """Control points of the speed, and the intervals, of a law with constant speed in the middle.
+
+    None if there is no middle: the ramps have whole steps, so two of them may be longer than ``length``.
+    """
     top = limits.speed + limits.lift(h, limits.speed)
     count = math.ceil(limits.ramp_s(top) / h) + DEGREE + 1
     rise = limits.rise(h * np.abs(np.arange(count) + _FIRST), top)
@@ -157,7 +161,10 @@ def _with_cruise(length: float, limits: MoveLimits, h: float, longest: float) ->
     weights = bspline.basis(DEGREE)[0, :-1]
     distances = np.append(0.0, (h * rise).cumsum())
     ramp = float(distances[-1] - weights @ distances[:DEGREE])
-    middle_s = _intervals((length - 2.0 * ramp) / float(rise[-1]), h, min(_LONGEST_S, longest / limits.speed))
+    cruise_s = (length - 2.0 * ramp) / float(rise[-1])
+    if cruise_s < _SHORTEST_CRUISE * h:
+        return None
+    middle_s = _intervals(cruise_s, h, min(_LONGEST_S, longest / limits.speed))
     steps_s = np.array([*[h] * count, *middle_s, *[h] * count])
     return np.concatenate([rise, np.full(len(middle_s), rise[-1]), rise[::-1]]), steps_s
 

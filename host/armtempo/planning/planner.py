@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.model.tool_segment import ToolSegment
-from armtempo.planning import checks, path_deviation, through_plan, workspace_check
+from armtempo.planning import checks, near_points, path_deviation, through_plan, workspace_check
 from armtempo.planning.free import around
 from armtempo.planning.through_plan import Planned
 from armtempo.splines import extremes
@@ -52,7 +53,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.limits_of(arm)
     holding = arm.holding(job.holds)
     checks.check_job(arm, job)
-    via, notes = via_angles(arm, job)
+    job, via, notes = points_of(arm, job)
     motion = PLANNERS[checks.planner_of(job)]
     with watched(progress) as watch:
         planned = motion(arm, job, via, watch)
@@ -62,21 +63,16 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     checks.check_reached(arm, reached)
     speeds_deg_s = np.array([each.speed_deg_s for each in reached])
     workspace_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
-    notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, via, trajectory))
+    notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, trajectory))
     return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
 
 
-def _swing_note(arm: Arm, job: Job, via_deg: Array, trajectory: Trajectory) -> list[str]:
+def _swing_note(arm: Arm, job: Job, trajectory: Trajectory) -> list[str]:
     """A note if a joint leaves the angles between two via points by more than ``_SWING_DEG``."""
     swing = path_deviation.widest_swing(trajectory, [each.via for each in job.tool_segments if each.line])
     if swing.beyond_deg <= _SWING_DEG:
         return []
     helps = 'path = "free" helps' if job.path == "through" else "a via point or a stop = true there keeps it"
-    if job.path == "through":
-        steps = np.abs(np.diff(via_deg, axis=0)) * [joint.steps_per_deg for joint in arm.driven]
-        twice = np.flatnonzero(np.all(steps < 1.0, axis=1))
-        for first in twice[np.abs(twice - swing.via) <= 1][:1].tolist():
-            helps = f"P{first} and P{first + 1} are less than a step apart: leave one out; or {helps}"
     joint = arm.driven[swing.joint]
     return [
         f"between P{swing.via} and P{swing.via + 1} {joint.name} reaches {swing.reached_deg:.2f} "
@@ -94,6 +90,25 @@ def versions() -> Mapping[str, str]:
         "python": platform.python_version(),
         "machine": platform.machine(),
     }
+
+
+class PlannedPoints(NamedTuple):
+    """What is planned of a job."""
+
+    job: Job
+    """Its via points less than a step apart are one."""
+    via_deg: Array
+    """(n + 1, J), the angles at its via points."""
+    notes: tuple[str, ...]
+
+
+def points_of(arm: Arm, job: Job) -> PlannedPoints:
+    """The job and the angles that are planned; errors as in ``near_points.merged`` and ``via_angles``."""
+    via, notes = via_angles(arm, job)
+    job, told = near_points.merged(arm, job, via)
+    if told:
+        via, notes = via_angles(arm, job)
+    return PlannedPoints(job, via, (*told, *notes))
 
 
 def via_angles(arm: Arm, job: Job) -> tuple[Array, tuple[str, ...]]:

@@ -27,9 +27,9 @@ def straight(name: str, start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm, spee
     another number of joints than the arm drives or leaves a joint's range.
     """
     start, end = posture(start_deg, arm), posture(end_deg, arm)
-    ways = np.abs(end - start)
-    longest = max(float(ways.max()), _LEAST_DEG)
-    gains = np.maximum(ways / longest, _LEAST_GAIN).tolist()
+    distances = np.abs(end - start)
+    longest = max(float(distances.max()), _LEAST_DEG)
+    gains = np.maximum(distances / longest, _LEAST_GAIN).tolist()
     limits = move_law.of_joints([joint.limits for joint in arm.driven], gains, speed)
     law = move_law.law(longest, limits)
     return law.trajectory(
@@ -51,17 +51,17 @@ def check_switches(start_deg: ArrayLike, end_deg: ArrayLike, arm: Arm) -> None:
 
 
 def ahead(start_deg: Array, end_deg: Array, arm: Arm) -> float:
-    """The part of the way from one posture (J,), at which the motors stand, to another that a move begins ahead.
+    """The part of the move from one posture (J,), at which the motors stand, to another that a move begins ahead.
 
-    No motor is then further than AHEAD_STEPS from where it stands; 0 for a way of a step or less.
+    No motor is then further than AHEAD_STEPS from where it stands; 0 for a move of a step or less.
     """
     here, there = arm.transmission.steps([start_deg, end_deg])
-    way = there - here
+    distances = there - here
     off = here - np.rint(here)
-    moving = way != 0.0
-    if not np.any(np.abs(way) > 1.0) or np.any(np.abs(off) > _OFF_STEPS):
+    moving = distances != 0.0
+    if not np.any(np.abs(distances) > 1.0) or np.any(np.abs(off) > _OFF_STEPS):
         return 0.0
-    return float(np.min((AHEAD_STEPS - np.sign(way) * off)[moving] / np.abs(way)[moving]))
+    return float(np.min((AHEAD_STEPS - np.sign(distances) * off)[moving] / np.abs(distances)[moving]))
 
 
 def backwards(trajectory: Trajectory, name: str) -> Trajectory:

@@ -11,6 +11,7 @@ from armtempo_shared.limits import FULL_OUTPUT
 from armtempo_shared.messages import PERMILLE, RESUME, SLOWEST_PERMILLE
 
 from armtempo.basics.errors import LinkError
+from armtempo.basics.kinds import is_text, is_whole
 from armtempo.ports.claim import VERSION
 from armtempo.ports.line_socket import LONGEST_LINE, LineStream, LongLineError
 
@@ -76,17 +77,15 @@ Fields = Mapping[str, Field]
 
 def _whole(least: int, most: int, *others: int, needed: bool = True) -> Field:
     words = f"a whole number from {least} to {most}" + "".join(f", or {other}" for other in others)
-    return Field(
-        words, lambda value: type(value) is int and (least <= value <= most or value in others), needed
-    )
+    return Field(words, lambda value: is_whole(value) and (least <= value <= most or value in others), needed)
 
 
-def _is_text(value: object) -> bool:
-    return isinstance(value, str) and len(value) <= LONGEST_TEXT and (not value or value.isprintable())
+def _is_short(value: Any) -> bool:
+    return is_text(value) and len(value) <= LONGEST_TEXT
 
 
 def _text() -> Field:
-    return Field(f"text of at most {LONGEST_TEXT} printable characters", _is_text, needed=False)
+    return Field(f"text of at most {LONGEST_TEXT} printable characters", _is_short, needed=False)
 
 
 REQUESTS: Mapping[str, Fields] = {
@@ -112,7 +111,7 @@ REQUESTS: Mapping[str, Fields] = {
 
 def is_id(value: object) -> bool:
     """Whether a value is allowed as the ``id`` of a request, which the answer repeats."""
-    return type(value) is int or _is_text(value)
+    return is_whole(value) or _is_short(value)
 
 
 def check(request: Message, fields: Fields) -> None:

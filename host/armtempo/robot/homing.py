@@ -1,8 +1,7 @@
-"""Homing by switches: approach, back off, approach slowly, go home; joint by joint, or as the arm file groups them.
+"""Homing by switches, joint by joint, or as the arm file groups them; the law is ``armtempo_shared.homing``.
 
 The board accepts these motions while a joint's position is unknown: it assumes that the joint is at the
-motion's start, and marks the position as unknown again at the end, until it is declared. A switch that trips
-ends the motion of all its joints; the others continue in another motion.
+motion's start, and marks the position as unknown again at the end, until it is declared.
 
 Coupled joints are homed one after the other: each moves alone, by all motors that turn it. The positions of these
 motors are declared, and the joints move home, when the angles of all coupled joints are known.
@@ -10,10 +9,11 @@ motors are declared, and the joints move home, when the angles of all coupled jo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
+from armtempo_shared.homing import ELSEWHERE, HELD, MISSED, Homing
 from armtempo_shared.messages import START_HOMING, START_SWITCHES_BIT
 
 from armtempo.basics.errors import InputError, LinkError
@@ -95,178 +95,133 @@ def _check_coupled(arm: Arm, fitted: set[int]) -> None:
             )
 
 
-@dataclass(frozen=True)
-class _GroupHoming:
-    """Homing of some joints together. Distances are positive towards the joint's switch."""
+class _GroupHoming(Homing):
+    """Homing of some joints together; lengths are in degrees, or mm of a sliding joint.
 
-    client: Client
-    arm: Arm
-    stop: StopRequest
-    switches: dict[int, HomeSwitch]
-    found_deg: dict[int, float]
-    """Angles of joints that are found, but not declared: their motors turn other joints too."""
-    told: _Told
+    ``found_deg``: angles of joints that are found, but not declared, as their motors turn other joints too.
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        arm: Arm,
+        stop: StopRequest,
+        switches: dict[int, HomeSwitch],
+        found_deg: dict[int, float],
+        told: _Told,
+    ) -> None:
+        super().__init__(switch.row(index) for index, switch in switches.items())
+        self._client, self._arm, self._stop = client, arm, stop
+        self._switches, self._found_deg, self._told = switches, found_deg, told
+        self._ends_deg: dict[int, float] = {}
 
     def run(self) -> None:
-        """Make both approaches, back off, declare the positions, and move the joints home."""
-        whole = {index: switch.farthest_deg for index, switch in self.switches.items()}
-        self.told(f"{self._names(whole)}: on the way to the switch")
-        gone_deg = self._approach(whole, home_switches.FAST)
-        for index, distance_deg in gone_deg.items():
-            sign = self.arm.driven[index].unit.sign
-            self.told(
-                f"{self._names([index])}: switch seen after {distance_deg:.1f}{sign}; once more, slowly"
-            )
-        self._approach_again()
-        away_deg = {index: switch.away_deg for index, switch in self.switches.items()}
-        self._leave(away_deg)
-        for index, distance_deg in away_deg.items():
-            switch = self.switches[index]
-            self.found_deg[index] = switch.trip_deg - switch.side * distance_deg
-        coupled = [self.arm.transmission.group(index) for index in self.switches]
-        found = [index for group in coupled if set(group) <= self.found_deg.keys() for index in group]
+        """Find the switches, declare the positions, and move the joints home."""
+        self._told(f"{self._names(self._switches)}: on the way to the switch")
+        self.find()
+        for index, switch in self._switches.items():
+            self._found_deg[index] = switch.trip_deg - switch.side * switch.away_deg
+        coupled = [self._arm.transmission.group(index) for index in self._switches]
+        found = [index for group in coupled if set(group) <= self._found_deg.keys() for index in group]
         if found:
             self._declare(found)
             self._go_home(found)
-            self.told(f"{self._names(found)}: at home", len(found))
+            self._told(f"{self._names(found)}: at home", len(found))
 
-    def _approach_again(self) -> None:
-        """Back off and approach slowly; a joint whose switch trips at once started on it, and backs off further."""
-        left = dict.fromkeys(self.switches, 0.0)
-        pressed = list(self.switches)
-        while pressed:
-            self._leave(dict.fromkeys(pressed, home_switches.BACK_DEG))
-            moves = self._approach(dict.fromkeys(pressed, 2 * home_switches.BACK_DEG), home_switches.SLOW)
-            pressed = []
-            for index, distance_deg in moves.items():
-                left[index] += home_switches.BACK_DEG - distance_deg
-                if distance_deg > 1.5 * home_switches.BACK_DEG:
-                    raise LinkError(
-                        f"{self.arm.driven[index].name}: its limit switch tripped {distance_deg:.2f} "
-                        f"{self.arm.driven[index].unit.word} after it had been left by {home_switches.BACK_DEG:g}",
-                        "check its wiring and that it sits firmly",
-                    )
-                if distance_deg < 0.5 * home_switches.BACK_DEG:
-                    pressed.append(index)
-            if stuck := [index for index in pressed if left[index] > home_switches.MOST_PRESSED_DEG]:
-                self._fail_pressed(stuck)
+    def seen(self, lengths: dict[int, int | float]) -> None:
+        """Tell it."""
+        for index, length_deg in lengths.items():
+            sign = self._arm.driven[index].unit.sign
+            self._told(f"{self._names([index])}: switch seen after {length_deg:.1f}{sign}; once more, slowly")
 
-    def _fail_pressed(self, stuck: list[int]) -> None:
-        levels = ", ".join(f'active = "{self.arm.driven[index].switches.active}"' for index in stuck)
-        raise LinkError(
-            f"{self._names(stuck)}: its limit switch is still pressed {home_switches.MOST_PRESSED_DEG:g} "
-            f"{self.arm.driven[stuck[0]].unit.word} away from where it tripped",
+    def failure(self, kind: int, joints: Sequence[int], length: int | float) -> LinkError:
+        """With what to do."""
+        names, unit = self._names(joints), self._arm.driven[joints[0]].unit.word
+        if kind == MISSED:
+            return LinkError(
+                f"{names}: no limit switch tripped within {length:.0f} {unit}, its range and a margin",
+                "check its wiring, its pin and its level ('active') in the arm file, and where the joint stands",
+            )
+        if kind == HELD:
+            return LinkError(
+                f"{names}: a switch of another joint stops it", "check the wiring of the switches"
+            )
+        if kind == ELSEWHERE:
+            return LinkError(
+                f"{names}: its limit switch tripped {length:.2f} {unit} after it had been left by "
+                f"{home_switches.BACK_DEG:g}",
+                "check its wiring and that it sits firmly",
+            )
+        levels = ", ".join(f'active = "{self._arm.driven[index].switches.active}"' for index in joints)
+        return LinkError(
+            f"{names}: its limit switch is still pressed {home_switches.MOST_PRESSED_DEG:g} {unit} away from where it "
+            "tripped",
             f"its level is probably inverted: the arm file has {levels}; or it is stuck, or wired to another pin",
         )
 
-    def _approach(self, distances_deg: dict[int, float], fraction: float) -> dict[int, float]:
-        """Move joints towards their switches until all have tripped; returns the distance of each, degrees."""
-        left = dict(distances_deg)
-        gone = dict.fromkeys(left, 0.0)
-        while left:
-            moved, tripped = self._towards(left, fraction)
-            for index, distance_deg in moved.items():
-                gone[index] += distance_deg
-                left[index] -= distance_deg
-            missed = [
-                index for index, distance_deg in left.items() if distance_deg <= home_switches.TOLERANCE_DEG
-            ]
-            if tripped in left:
-                del left[tripped]
-            elif missed:
-                raise LinkError(
-                    f"{self._names(missed)}: no limit switch tripped within {distances_deg[missed[0]]:.0f} "
-                    f"{self.arm.driven[missed[0]].unit.word}, its range and a margin",
-                    "check its wiring, its pin and its level ('active') in the arm file, and where the joint stands",
-                )
-            elif max(moved.values()) <= home_switches.TOLERANCE_DEG:
-                raise LinkError(
-                    f"{self._names(left)}: a switch of another joint stops it",
-                    "check the wiring of the switches",
-                )
-        return gone
-
-    def _towards(self, left: dict[int, float], fraction: float) -> tuple[dict[int, float], int]:
-        """One motion towards the switches, at most over a range; returns each joint's distance, and whose
-        switch tripped."""
-        moves = {}
-        for index, distance_deg in left.items():
-            switch = self.switches[index]
-            step_deg = min(distance_deg, switch.span_deg)
-            moves[index] = (switch.edge_deg - switch.side * step_deg, switch.edge_deg)
-        ends, tripped = self._move(moves, fraction)
-        return {index: abs(end_deg - moves[index][0]) for index, end_deg in ends.items()}, tripped
-
-    def _leave(self, distances_deg: dict[int, float]) -> None:
-        moves = {}
-        for index, distance_deg in distances_deg.items():
-            switch = self.switches[index]
-            moves[index] = (switch.edge_deg, switch.edge_deg - switch.side * distance_deg)
-        self._move(moves, home_switches.FAST)
+    def stands(self, joint: int) -> float:
+        """After the last motion, in which it moved."""
+        return self._ends_deg[joint]
 
     def _declare(self, found: list[int]) -> None:
         """Declare that joints are at the angles that were found for them."""
-        angles = np.zeros(len(self.arm.driven))
-        angles[found] = [self.found_deg.pop(index) for index in found]
-        steps = self.arm.transmission.whole_steps(angles)
-        self.client.home([value if motor in found else None for motor, value in enumerate(steps)])
+        angles = np.zeros(len(self._arm.driven))
+        angles[found] = [self._found_deg.pop(index) for index in found]
+        steps = self._arm.transmission.whole_steps(angles)
+        self._client.home([value if motor in found else None for motor, value in enumerate(steps)])
 
     def _go_home(self, found: list[int]) -> None:
         stands_deg = self._posture_deg()
-        moves = {index: (stands_deg[index], self.arm.driven[index].home_deg) for index in found}
-        ends, _ = self._move(moves, home_switches.FAST)
+        home_deg = {index: self._arm.driven[index].home_deg for index in found}
+        self.move({index: stands_deg[index] for index in found}, home_deg, False)
         stopped = [
             index
-            for index, end_deg in ends.items()
-            if abs(end_deg - moves[index][1]) > home_switches.TOLERANCE_DEG
+            for index in found
+            if abs(self.stands(index) - home_deg[index]) > home_switches.TOLERANCE_DEG
         ]
         if stopped:
             raise LinkError(
                 f"{self._names(stopped)}: a switch tripped on the way to its home posture",
-                f"check {self.arm.driven[stopped[0]].unit.key('home_deg')} and the switches in the arm file",
+                f"check {self._arm.driven[stopped[0]].unit.key('home_deg')} and the switches in the arm file",
             )
 
     def _names(self, joints: Iterable[int]) -> str:
-        return ", ".join(self.arm.driven[index].name for index in joints)
+        return ", ".join(self._arm.driven[index].name for index in joints)
 
-    def _move(
-        self, turns_deg: dict[int, tuple[float, float]], fraction: float
-    ) -> tuple[dict[int, float], int]:
-        """Move joints at a fraction of their limits, each from and to an angle.
-
-        Returns the angles at which they came to rest, degrees, and the joint whose switch ended it (or NO_JOINT).
-        """
+    def move(self, starts: dict[int, int | float], ends: dict[int, int | float], is_slow: bool) -> int:
+        """See ``Homing``; at a fraction of the joints' limits."""
         start_deg = self._posture_deg()
         end_deg = list(start_deg)
-        for index, (from_deg, to_deg) in turns_deg.items():
-            start_deg[index], end_deg[index] = from_deg, to_deg
-        slow_arm = _slowed(self.arm, fraction)
+        for index in starts:
+            start_deg[index], end_deg[index] = starts[index], ends[index]
+        slow_arm = _slowed(self._arm, home_switches.SLOW if is_slow else home_switches.FAST)
         trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
-        motion = encoded_motion.of_trajectory(trajectory, self.arm)
-        key, flags = put_once(self.client, motion.data), self._flags(turns_deg)
-        with attended(self.client, self.stop):
-            follower = MotionFollower(self.client, self.client.start(key.name, key.crc, flags))
-            end = follow(self.client, self.stop, follower).end
-        tripped = self.client.status().fault_joint
+        motion = encoded_motion.of_trajectory(trajectory, self._arm)
+        key, flags = put_once(self._client, motion.data), self._flags(starts)
+        with attended(self._client, self._stop):
+            follower = MotionFollower(self._client, self._client.start(key.name, key.crc, flags))
+            end = follow(self._client, self._stop, follower).end
+        tripped = self._client.status().fault_joint
         raise_fault(end)
-        self.stop.check()
-        ends_deg = self.arm.transmission.angles_of_steps(end.positions.commanded_steps)
-        return {index: float(ends_deg[index]) for index in turns_deg}, tripped
+        self._stop.check()
+        ends_deg = self._arm.transmission.angles_of_steps(end.positions.commanded_steps)
+        self._ends_deg = {index: float(ends_deg[index]) for index in starts}
+        return tripped
 
     def _flags(self, moving: Iterable[int]) -> int:
         """The flags of the start: also whose switches end it, if motors turn that do not show who moves."""
-        if not self.arm.coupling:
+        if not self._arm.coupling:
             return START_HOMING
         return START_HOMING | sum(1 << index for index in moving) << START_SWITCHES_BIT
 
     def _posture_deg(self) -> list[float]:
         """The joints' angles; of joints of unknown position, which do not move, those found or their home angles."""
-        status = self.client.status()
-        here_deg = arm_state.angles_deg(status, self.arm).tolist()
-        known = arm_state.known_joints(status, self.arm)
+        status = self._client.status()
+        here_deg = arm_state.angles_deg(status, self._arm).tolist()
+        known = arm_state.known_joints(status, self._arm)
         return [
-            here_deg[index] if known[index] else self.found_deg.get(index, joint.home_deg)
-            for index, joint in enumerate(self.arm.driven)
+            here_deg[index] if known[index] else self._found_deg.get(index, joint.home_deg)
+            for index, joint in enumerate(self._arm.driven)
         ]
 
 

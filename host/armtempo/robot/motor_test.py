@@ -41,9 +41,9 @@ _WIRING = "check its wire, its pin in the arm file, and the level at which it tr
 
 def question(arm: Arm, posture_deg: Array) -> str:
     """The question to confirm: lists all moves from this posture, degrees (J,)."""
-    ways = zip(arm.driven, posture_deg, strict=True)
+    moves = zip(arm.driven, posture_deg, strict=True)
     joints = ", ".join(
-        f"{joint.name} by {way_deg(joint, at_deg):+.2g}{joint.unit.sign}" for joint, at_deg in ways
+        f"{joint.name} by {move_deg(joint, at_deg):+.2g}{joint.unit.sign}" for joint, at_deg in moves
     )
     return (
         f"arm {arm.name!r}: the drivers are switched on, and these move there and back, slowly, one after the other: "
@@ -51,7 +51,7 @@ def question(arm: Arm, posture_deg: Array) -> str:
     )
 
 
-def way_deg(joint: DrivenJoint, at_deg: float) -> float:
+def move_deg(joint: DrivenJoint, at_deg: float) -> float:
     """The move of a joint, degrees, towards the farther end of its range."""
     low_deg, high_deg = joint.range_deg
     following_deg = joint.encoder.following_error_deg if joint.encoder else 0.0
@@ -93,7 +93,7 @@ class MotorTest:
             )
         try:
             for joint, at_deg in zip(self._arm.driven, posture_deg, strict=True):
-                self._joint(joint, way_deg(joint, at_deg))
+                self._joint(joint, move_deg(joint, at_deg))
             for joint, at_deg in zip(self._arm.driven, posture_deg, strict=True):
                 self._switches(joint, at_deg)
             self._estop(posture_deg[0])
@@ -170,7 +170,7 @@ class MotorTest:
     def _press(self, what: str, code: int, joint: DrivenJoint, at_deg: float, side: int = 0) -> None:
         """Move ``joint`` slowly from ``at_deg`` and back until the pressed switch stops it, on its way to ``side``."""
         self._tell(f"press {what} now, while {joint.name} moves slowly to and fro; keep clear of the arm")
-        by_deg = way_deg(joint, at_deg)
+        by_deg = move_deg(joint, at_deg)
         measured, is_seen = "not seen", False
         for to_deg, way in ((at_deg + by_deg, by_deg), (at_deg, -by_deg)) * _TRIES:
             try:

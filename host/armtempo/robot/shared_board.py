@@ -12,6 +12,7 @@ from typing import Any, Self
 from armtempo_shared.messages import RESUME
 
 from armtempo.basics.errors import InputError, LinkError
+from armtempo.basics.kinds import is_text
 from armtempo.link.board_messages import Levels
 from armtempo.ports import claim, names
 from armtempo.ports.caller import Caller
@@ -122,7 +123,7 @@ def attach(port: str | None = None) -> SharedBoard:
     """
     from armtempo.ports import board_port
 
-    if not (port is None or (isinstance(port, str) and port.isprintable())):
+    if not (port is None or is_text(port)):
         raise InputError(f"attach: port is {port!r:.40}", "give the name of a port, or None")
     chosen = board_port.choose(port, others=True)
     found = find(chosen.value)

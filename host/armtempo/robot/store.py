@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,8 +19,11 @@ from armtempo.link import Client
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
+from armtempo.model.parts import PROGRAM
 from armtempo.model.sequence_plan import AnyPlan, SequencePlan, load_plan
 from armtempo.robot.connection import Connection
+
+LOG = logging.getLogger("armtempo")
 
 _KINDS = {sequence.MAGIC[:KIND_BYTES]: "sequence", program.MAGIC[:KIND_BYTES]: "program"}
 """What records of other kinds than motions begin with."""
@@ -66,14 +70,21 @@ class BoardStore:
         """Store a motion, or a sequence with its motions, unless the board already has it; ``progress`` counts bytes.
 
         ``motion``: a plan or its file. ``name``: of a motion on the board; default: from the job's name.
-        ``default``: let the board's button start it. ``replace``: replace something else of this name; if that was
-        the default, the button starts nothing. Raises LinkError if there is something else and ``replace`` is
+        ``default``: let the board's button start it; at power-up it does not start, of which the logger "armtempo"
+        warns on an arm with ``at_power_up``. ``replace``: replace something else of this name; if that was the
+        default, the button starts nothing. Raises LinkError if there is something else and ``replace`` is
         false, or the board is set up for another arm.
         """
         found = self._board.encoded(load_plan(motion) if isinstance(motion, Path | str) else motion, name)
         store(self._board.client, found.records, progress, replace)
         if default:
             self._board.client.set_default(found.name)
+            if found.arm.safety.at_power_up == PROGRAM:
+                LOG.warning(
+                    "the board's button starts %r, but nothing starts at power-up: only a program that homes the arm "
+                    "does ('armtempo help programs')",
+                    found.name,
+                )
         return found
 
     def upload_sequence(

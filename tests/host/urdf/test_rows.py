@@ -140,6 +140,30 @@ def test_ranges_are_the_urdfs_and_never_wider(tmp_path: Path) -> None:
     assert next(joint.home_deg for joint in arm.joints if joint.name == "j3") == 71.6  # 0 is not in its range
 
 
+@pytest.mark.parametrize(
+    ("soft", "range_deg", "said"),
+    [
+        ("soft_lower_limit='-1.5' soft_upper_limit='1.75' k_velocity='1'", (-85.943, 100.267), "-85.944 to 100.27"),
+        ("soft_lower_limit='-3' soft_upper_limit='1'", (-114.591, 57.295), "-114.59 to 57.296"),
+        ("soft_lower_limit='-3' soft_upper_limit='3'", (-114.591, 114.591), ""),
+        ("k_velocity='1'", (-114.591, 114.591), ""),
+        ("soft_lower_limit='2.5' soft_upper_limit='3'", (-114.591, 114.591), "2.5 to 3, leave it no range"),
+        ("soft_lower_limit='1' soft_upper_limit='-1'", (-114.591, 114.591), "1 to -1, leave it no range"),
+    ],
+)  # fmt: skip
+def test_soft_limits_narrow_a_range(
+    tmp_path: Path, soft: str, range_deg: tuple[float, float], said: str
+) -> None:
+    urdf, out = tmp_path / "soft.urdf", tmp_path / "arm.toml"
+    text = (FOLDER / "three_planar.urdf").read_text()
+    urdf.write_text(text.replace(J2_LIMIT, f"{J2_LIMIT}<safety_controller {soft}/>"))
+    told = CliRunner().invoke(main, ["import-urdf", str(urdf), "-o", str(out)]).output
+    assert said in told
+    assert ("safety_controller" in told) == bool(said)
+    assert ("by the soft limits" in out.read_text()) == ("leave it" not in said and bool(said))
+    assert Arm.shape(out).joints[1].range_deg == pytest.approx(range_deg, abs=2e-3)
+
+
 def test_quarter_turns_with_few_digits_become_quarter_turns(tmp_path: Path) -> None:
     """So that the closed-form inverse serves the arm."""
     arm = Arm.read(imported(tmp_path, "six_rounded")[0])

@@ -13,11 +13,16 @@ import ctypes
 import functools
 from array import array
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any, TypeVar
+
+from pointers import by_index  # type: ignore[import-not-found]  # beside this file, which is on the path
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _REACH = 8192  # bytes that can be reached from an address
 _MOST_KEPT = 4096
+_MANY_CALLS = 300
+"""After these a function is rewritten (pointers.py), which takes as long as it saves in about as many calls."""
 
 
 def _address(pointer: Any) -> int:
@@ -81,7 +86,19 @@ def viper(function: Callable[..., Any]) -> Callable[..., Any]:
     names = function.__code__.co_varnames[: function.__code__.co_argcount]
     casts = {name: _cast_of(function.__annotations__.get(name)) for name in names}
     values = [f"cast_{name}({name})" if casts[name] else name for name in names]
-    known = {"function": function, **{f"cast_{name}": cast for name, cast in casts.items()}}
+    known = {f"cast_{name}": cast for name, cast in casts.items()}
+    known["function"] = function
+    if isinstance(function, FunctionType):
+        calls = 0
+
+        def first_calls(*arguments: Any) -> Any:
+            nonlocal calls
+            calls += 1
+            if calls == _MANY_CALLS:
+                known["function"] = by_index(function)
+            return function(*arguments)
+
+        known["function"] = first_calls
     # with exactly these arguments: *args would cost more than the casts
     call = eval(f"lambda {', '.join(names)}: function({', '.join(values)})", known)
     return functools.wraps(function)(call)

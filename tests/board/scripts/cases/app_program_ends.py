@@ -121,7 +121,12 @@ def case_a_full_heap_ends_it():
 
 
 def case_a_pass_without_memory_is_the_programs_fault():
-    """The program has filled the heap, and what the board's own work lacks is missing."""
+    """The program has filled the heap, and what the board's own work lacks is missing; or the stack, by recursion."""
+    for error in (MemoryError, RuntimeError):
+        _lacks(error)
+
+
+def _lacks(error):
 
     def script(world):
         engine = world.board.engine
@@ -132,13 +137,13 @@ def case_a_pass_without_memory_is_the_programs_fault():
 
     def full():
         del world.app.link.poll
-        raise MemoryError
+        raise error
 
     world = World("cell.start('there')\nwhile True:\n    cell.moving()\n", script)
     ending, code, line = world.run()
     assert (ending, wire.ERRORS[code][0], line) == ("fault", "program_failed", 4), (ending, code, line)
     assert "brake" in world.board.engine.calls and "freeze" not in world.board.engine.calls
-    assert "MemoryError" in world.said()[0]
+    assert error.__name__ in world.said()[0]
 
 
 def case_what_a_lost_host_was_not_told_gives_way_to_the_traceback():

@@ -22,6 +22,11 @@ def arrives(world):
         engine.finish()
 
 
+def arrives_slowly(world):
+    if world.turns % 20 == 0:
+        arrives(world)
+
+
 def case_calls_do_what_they_say():
     world = World(
         'cell.goto("there")\n'
@@ -189,6 +194,11 @@ def case_what_is_not_possible_is_an_exception_with_words():
         ("goto([0.1, 0])", "goto is refused: too_long, 100"),
         ("run('back')", "run('back') is refused: wrong_start"),
         ("run('none')", "run('none') is refused: not_found"),
+        ("goto({})", "a posture has 2 angles, not 0"),
+        ("wait(['part'])", "the name of the input is a text, not ['part']"),
+        ("run(3)", "the name of the motion is a text, not 3"),
+        ("count(None)", "the name of the counter is a text, not None"),
+        ("pallet({})", "the name of the pallet is a text, not {}"),
         ("count('n' * 25)", "count: the name 'nnnnnnnnnnnnnnnnnnnnnnnnn' has not 1 to 24 bytes"),
     ):
         world = World(
@@ -204,6 +214,27 @@ def case_what_is_not_possible_is_an_exception_with_words():
             assert world.run()[0] == "finished", call
         assert world.said() == [words], (call, world.said())
         assert not sequence_rig.runs(world.app) and not world.board.outputs.log
+
+
+def case_what_a_program_writes_is_in_the_flash_before_it_moves():
+    synced = []
+
+    class Os:
+        def sync(self):
+            synced.append(world.board.engine.moving)
+
+    world = World(
+        "open('/dev/null').close()\ncell.goto('there')\nopen('/dev/null', 'w').close()\ncell.goto('home', wait=False)\n"
+        "try:\n    open('/dev/null', 'a')\nexcept cell.Error as error:\n    print(error)\n",
+        arrives_slowly,
+    )
+    assert world.start()[0] == "ok"
+    module = sys.modules["armtempo_board.app.user_program"]
+    module.os = Os()
+    world.execute()
+    assert world.stands()[0] == "finished"
+    assert synced == [False], synced
+    assert world.said()[0].startswith("open: '/dev/null' cannot be written while the arm moves"), world.said()
 
 
 def case_marks_serve_a_loop_without_calls_and_tell_its_line():

@@ -207,6 +207,47 @@ def case_whole_path():  # slow
         assert (rig.samples[-1][2] & 0xFFFFFFFF) >= end, number
 
 
+def case_standing_joints():
+    """In a joint that stands no step is looked for, and it is as after the walk through its motion."""
+    random.seed(SEED + 2)
+    times = [(number - 2) / 10 for number in range(14)]
+    for rate in (1000, 400):
+        places = some_place()
+        angles = [[place] * 14 for place in places]
+        angles[1][5:] = [places[1] + 40.0 + number for number in range(4)] + [places[1] + 50.0] * 5
+        motion = record(some_ramps(), angles, times)
+        rig = Rig(joints(), planned=False)
+        rig.trusting()
+        stands = [int(place + 1000.5) - 1000 for place in places]
+        rig.engine.home(7, stands)
+        looked = [0, 0, 0]
+        for number, drive in enumerate(rig.engine.drives):
+            count_searches(drive.generator, looked, number)
+        rig.engine.load(motion, rate)
+        assert looked[0] == looked[2] == 0 < looked[1], looked
+        found = [rig.engine.drives[number].generator.end_steps(False) for number in (0, 2)]
+        rig.engine.start()
+        rig.run_to(4 * TICK_HZ)
+        assert not rig.engine.moving and rig.engine.fault == 0, rig.engine.fault
+        assert found == rig.commanded()[::2] == stands[::2], (found, stands)
+        for number in (0, 2):
+            generator = rig.engine.drives[number].generator
+            generator.load(motion, number, stands[number], 168, 1000)
+            assert looked[number] and generator.ended and not generator.waits()
+            assert generator.end_steps(False) == stands[number]
+
+
+def count_searches(generator, looked, number):
+    """Count in ``looked`` how often steps are looked for."""
+    search = generator.subintervals.search
+
+    def counted(steps):
+        looked[number] += 1
+        return search(steps)
+
+    generator.subintervals.search = counted
+
+
 def some_leg(rig, start, end):
     """A motion of three joints from the steps ``start`` to ``end``, where they rest, but with acceleration."""
     times = [random.randrange(20, 80) / 1000 for _ in range(14)]

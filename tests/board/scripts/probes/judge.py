@@ -18,7 +18,8 @@ def main(low, high, rate, gap, *records):
         with open(record, "rb") as file:
             motion = Motion(file.read())
         try:
-            print(check(motion, [row] * motion.joints, int(gap), subintervals))
+            check(motion, [row] * motion.joints, int(gap), subintervals)
+            print(None)
         except Refused as refused:
             print((refused.code, refused.joint, refused.value))
 

@@ -72,7 +72,7 @@ class StepGenerator:
     def close(self):
         """There is no file."""
 
-    def load(self, motion, joint, position, pulse, gap):
+    def load(self, motion, joint, position, pulse, gap, moves=1):
         """Stand before the first step."""
         self._steps = motion.joints[joint]
         self._end_steps = position + self._steps.total()
@@ -225,6 +225,7 @@ class Evaluator:
         """The refusal that a test has set."""
         if Evaluator.refusal:
             raise Refused(*Evaluator.refusal)
+        return 0xFF
 
     @staticmethod
     def duration_ticks(motion):

@@ -268,13 +268,20 @@ def case_an_exception_in_a_callback_switches_it_off():
     board = bare_board.start()
     calls = []
 
+    class Ended(BaseException):
+        """As of a user's program."""
+
     def fail(timer):
-        calls.append(1)
-        raise ValueError("on purpose")
+        calls.append(timer)
+        raise Ended("on purpose")
 
     pyb.Timer(6, freq=1000, callback=fail)
     board.spend(5 * 84_000)
     assert len(calls) == 1
+    board.schedule(fail, 5)
+    board.schedule(calls.append, 6)
+    board.spend(1)
+    assert calls[1:] == [5, 6]
 
 
 def case_encoder_counter_wraps():

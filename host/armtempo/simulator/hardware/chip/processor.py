@@ -7,6 +7,8 @@ the chip's latency.
 
 import sys
 
+from machine_state import PowerOff, Reset
+
 from chip import capture, dma, gpio, memory, timers
 
 TICKS_PER_MS = 84_000
@@ -274,7 +276,7 @@ class Chip:
             return
         while self.scheduled:
             function, argument = self.scheduled.pop(0)
-            function(argument)
+            self._call(function, argument, "scheduled function")
         while self.pending and not self.masked:
             source, detail = self.pending.pop(0)
             callback = self.callbacks.get((source, detail))
@@ -287,17 +289,24 @@ class Chip:
         self._run(self.now + INTERRUPT_TICKS + self.late_ticks)
         if source in self.timers:
             self.timers[source].acknowledge(detail)
-        try:
-            function(argument)
-        except Exception as error:
-            # as the firmware: print it, and disable the callback
-            sys.stderr.write("uncaught exception in interrupt handler\n")
-            print_exception(error)
-            del self.callbacks[(source, detail)]
+        if not self._call(function, argument, "interrupt handler"):
+            del self.callbacks[(source, detail)]  # as the firmware does
         self.sync()
         self._run(self.now + CALLBACK_TICKS)
         self.serving = False
         self._find_event()
+
+    def _call(self, function, argument, what):
+        """Call it, and print what it raises, as the firmware does; returns whether it ended well."""
+        try:
+            function(argument)
+        except (Reset, PowerOff):
+            raise
+        except BaseException as error:
+            sys.stderr.write("uncaught exception in %s\n" % what)
+            print_exception(error)
+            return False
+        return True
 
 
 def print_exception(error):
