@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable, Iterator
 from functools import partial
 from pathlib import Path
 from threading import Thread
@@ -41,8 +42,8 @@ _SCRIPT = Path(__file__).with_name("panel.js").read_text(encoding="utf-8")
 _STYLE = Path(__file__).with_name("panel.css").read_text(encoding="utf-8")
 
 
-def build(operator: PanelBoard, hold: ButtonHold, shape: ArmShape) -> PanelPage:
-    """The page of a client."""
+async def build(operator: PanelBoard, hold: ButtonHold, shape: ArmShape) -> PanelPage:
+    """The page of a client, with pauses, in which the server hears the stops of other pages."""
     client = ui.context.client
     page = PanelPage(operator, hold, shape, client.id)
     ui.add_css(_STYLE)
@@ -53,12 +54,14 @@ def build(operator: PanelBoard, hold: ButtonHold, shape: ArmShape) -> PanelPage:
     with ui.element("div").classes("armtempo-page"):
         _header(page)
         problem.build(page)
+        await asyncio.sleep(0)
         with ui.element("div").classes("armtempo-main"):
             with ui.element("div").classes("armtempo-picture"):
                 page.picture = ui.element("div").classes("armtempo-scene")
                 _views(page)
             with ui.element("div").classes("armtempo-tabs"):
-                _tabs(page)
+                for _ in _tabs(page):
+                    await asyncio.sleep(0)
         _dock(page)
     page.on_look(Paths(page).look)
     _events(page)
@@ -78,7 +81,7 @@ def _header(page: PanelPage) -> None:
         freeze.classes("armtempo-freeze").props("no-caps outline").tooltip(words.FREEZE_HINT)
         with ui.element("div").classes("armtempo-title"):
             ui.label(f"{words.TITLE} · {words.plain(operator.arm.name)}").classes("armtempo-name-of-arm")
-            live_texts.label(operator, "armtempo-state").props('role="status"')
+            page.live_label("armtempo-state").props('role="status"')
         take = ui.button(words.TAKE_CONTROL).props("outline color=white no-caps").classes("armtempo-take")
 
         def taken(press: Press, _: object) -> None:
@@ -119,8 +122,8 @@ def _dock(page: PanelPage) -> None:
         return words.NOT_PAUSED if state is not None and state.speed_percent else ""
 
     with ui.element("footer").classes("armtempo-dock"):
-        live_texts.label(page.operator, "armtempo-where")
-        live_texts.label(page.operator, "armtempo-said").props('role="status"')
+        page.live_label("armtempo-where")
+        page.live_label("armtempo-said").props('role="status"')
         with ui.element("div").classes("armtempo-speeds"):
             for text, icon, call, why_not in (
                 (words.PAUSE, "pause", Board.pause, str),
@@ -185,8 +188,9 @@ class Paths:
             scene.draw("run", path, arm_scene.RUN)
 
 
-def _tabs(page: PanelPage) -> None:
-    parts = {
+def _tabs(page: PanelPage) -> Iterator[None]:
+    """The tabs; the first one is built at once, with pauses."""
+    parts: dict[str, Callable[[PanelPage], object]] = {
         words.TAB_MOVE: move_tab.build,
         words.TAB_JOB: job_tab.build,
         words.TAB_RUN: run_tab.build,
@@ -210,7 +214,10 @@ def _tabs(page: PanelPage) -> None:
         page.refresh()
 
     shown.on_value_change(lambda event: show(event.value))
-    show(words.TAB_MOVE)
+    page.shown, build_first = words.TAB_MOVE, parts.pop(words.TAB_MOVE)
+    with places[words.TAB_MOVE]:
+        yield from page.parts(words.TAB_MOVE, lambda: build_first(page))
+    page.refresh()
 
 
 def _aside(call: Any) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import suppress
 
 import numpy as np
-from nicegui import ui
 
 from armtempo.basics.errors import InputError
 from armtempo.kinematics.of_arm import forward
@@ -15,13 +14,6 @@ from armtempo.panel.panel_board import PanelBoard
 
 OLD_S = 0.5
 """A state that is older than this is shown with its age."""
-
-
-def label(operator: PanelBoard, place: str) -> ui.label:
-    """A place with its text as it is now, which is there before the first message to the page."""
-    made = ui.label(texts(operator)[place])
-    made.props["id"] = place
-    return made
 
 
 def texts(operator: PanelBoard) -> dict[str, str]:
