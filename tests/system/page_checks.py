@@ -35,8 +35,9 @@ _PROBLEMS = """() => {
   for (const label of document.querySelectorAll('.q-field--float .q-field__label')) {
     const value = label.closest('.q-field').querySelector('.q-field__native');
     if (!value || !seen(label)) continue;
-    const above = value.getBoundingClientRect().top + parseFloat(getComputedStyle(value).paddingTop);
-    if (label.getBoundingClientRect().bottom > above + 3) found.push(`label over its value: ${name(label)}`);
+    const box = value.getBoundingClientRect(), style = getComputedStyle(value);
+    const middle = (box.top + parseFloat(style.paddingTop) + box.bottom - parseFloat(style.paddingBottom)) / 2;
+    if (label.getBoundingClientRect().bottom > middle) found.push(`label over its value: ${name(label)}`);
   }
 
   // Contrast of text, WCAG 2.1: 4.5 to 1, or 3 to 1 if it is large
