@@ -237,7 +237,7 @@ def test_free_floor_holds_for_any_multipliers(seed: int) -> None:
     )
     chosen = rng.normal(0, 0.3, (6, 3, 3, via_bound._COLUMNS))
     ends = rng.normal(0, 0.3, (7, 3, 2))
-    chosen[..., via_bound._INNER :] = np.concatenate([ends[:-1], ends[1:]], axis=-1)[:, None]
+    chosen[..., via_bound._ENDS] = np.concatenate([ends[:-1], ends[1:]], axis=-1)[:, None]
     scan = via_bound._Scan(ways, limits, ABOUT_S[:, None] * via_bound._TRIAL_TIMES, chosen)
     low = scan._between()
     for s in rng.uniform(0, 1, 20):

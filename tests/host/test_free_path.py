@@ -14,12 +14,15 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
-from armtempo.optimise.kkt import BandedKkt, Factor
+from armtempo.optimise.reduced_kkt import ReducedFactor, ReducedKkt
 from armtempo.planning import checks, collocation, motion_program, planner, rest_to_rest
 from armtempo.planning.collocation import Curve, Ratios
 from armtempo.planning.free import corridor, free_path
+from armtempo.planning.free.angle_bounds import AngleRows
 from armtempo.planning.free.free_motion import Demand, FreeMotion
+from armtempo.planning.limit_rows import LimitRows
 from armtempo.planning.tool import Tool
+from armtempo.planning.variables import MotionVariables
 from armtempo.splines import bspline
 
 from tests.host import problems
@@ -338,17 +341,38 @@ def test_a_plan_takes_few_and_small_matrices() -> None:
     """Counted, because seconds depend on the load: of six joints with 1378 variables on the final segments."""
     counted: list[int] = []
 
-    class Counted(BandedKkt):
-        def factor(self, entries: np.ndarray) -> Factor:
-            counted.append(len(entries))
-            return super().factor(entries)
+    class Counted(ReducedKkt):
+        def factor(self, entries: np.ndarray) -> ReducedFactor:
+            factor = super().factor(entries)
+            width, size = factor.lower.shape
+            counted.append(width**2 * size)
+            return factor
 
     arm, job = problems.spread_out(0, 6, 7)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(motion_program, "BandedKkt", Counted)
+        patch.setattr(motion_program, "ReducedKkt", Counted)
         planner.plan(arm, replace(job, starts=1))
     assert len(counted) <= 50
-    assert sum(counted) <= 6_500_000
+    assert sum(counted) <= 110_000_000, "operations of Cholesky's factors"
+
+
+def test_rows_of_a_free_path_have_their_derivatives_and_the_products_of_these() -> None:
+    rng = np.random.default_rng(3)
+    variables = MotionVariables(3, 5, 2)
+    x = variables.pack(rng.normal(size=(8, 2)), rng.uniform(0.5, 1.5, 7))
+    low = np.where(rng.random((3, 6, 2)) < 0.5, -5.0, -np.inf)
+    at = Ratios.grid(3, 2, (1, 2, 9))
+    for rows in (LimitRows(variables, at, np.full((2, 3), 9.0)), AngleRows(variables.size, low, 5.0 - low)):
+        slopes = rows.linearise(x)
+        matrix = np.array([slopes.forward(one) for one in np.eye(variables.size)]).T
+        moved = [(rows.values(x + step) - rows.values(x - step)) / 2e-6 for step in 1e-6 * np.eye(len(x))]
+        assert matrix == pytest.approx(np.array(moved).T, rel=1e-5, abs=1e-5 * np.abs(matrix).max())
+        weights = rng.uniform(0.1, 1.0, rows.count)
+        assert slopes.backward(weights) == pytest.approx(matrix.T @ weights)
+        products = np.zeros((len(x), len(x)))
+        np.add.at(products, (rows.rows, rows.columns), slopes.hessian(weights, weights, False))
+        assert products == pytest.approx(matrix.T @ (weights[:, None] * matrix))
+    assert np.array_equal(at.kind[LimitRows(variables, at, np.ones((2, 3))).order], np.sort(at.kind))
 
 
 def test_ratios_added_keep_their_places_and_peaks_lower_what_is_allowed_next_to_them() -> None:

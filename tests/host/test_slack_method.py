@@ -7,6 +7,7 @@ import pytest
 from armtempo.basics.arrays import Array
 from armtempo.optimise import slack_method
 from armtempo.optimise.kkt import BandedKkt, Equalities
+from armtempo.optimise.reduced_kkt import ReducedKkt
 from armtempo.optimise.slack_method import Goal
 from scipy.optimize import linprog
 
@@ -89,3 +90,36 @@ def test_linear_programs_end_at_their_vertex_and_never_outside(seed: int) -> Non
 def test_a_start_beyond_a_linear_inequality_is_returned() -> None:
     start = np.array([-2.0, 0.0])
     assert slack_method.minimise(Disc(), start, np.array([False, True]), TIGHT).x is start
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_eliminated_equalities_leave_the_step_of_the_whole_matrix(seed: int) -> None:
+    """With rows that share variables, some of which are solved for later, and one that fixes a variable."""
+    rng = np.random.default_rng(seed)
+    size, count = 30, 6
+    row = np.repeat(np.arange(count), 5)
+    column = (4 * np.arange(count)[:, None] + np.arange(5)).ravel()
+    value = rng.normal(size=len(row)) * np.repeat(np.arange(count) != 3, 5)
+    value[17] = 2.0
+    equalities = Equalities(row, column, value, np.zeros(count), 4.0 * np.arange(count) + 2.0)
+    rows, columns = np.nonzero(np.abs(np.subtract.outer(np.arange(size), np.arange(size))) <= 3)
+    slopes = rng.normal(size=(size, 4))
+    entries = np.where(rows == columns, 1.0, 0.0)
+    for first in range(size - 3):
+        within = (rows >= first) & (rows < first + 4) & (columns >= first) & (columns < first + 4)
+        entries[within] += np.outer(slopes[first], slopes[first]).ravel()
+    places = np.arange(size) + rng.uniform(0.0, 0.4, size)
+    gradient, residual = rng.normal(size=size), rng.normal(size=count)
+    whole, reduced = (
+        kind(places, rows, columns, equalities).factor(entries).solve(gradient, residual)
+        for kind in (BandedKkt, ReducedKkt)
+    )
+    assert reduced == pytest.approx(whole, rel=1e-9, abs=1e-9), f"seed {seed}"
+
+
+def test_equalities_that_depend_on_each_other_and_indefinite_matrices_are_singular() -> None:
+    index, twice = np.arange(3), np.array([0, 0, 1, 1])
+    same = Equalities(twice, np.array([0, 1, 0, 1]), np.ones(4), np.zeros(2), np.zeros(2))
+    for equalities, entries in ((same, np.ones(3)), (Equalities.none(), np.array([1.0, -1.0, 1.0]))):
+        with pytest.raises(np.linalg.LinAlgError):
+            ReducedKkt(index.astype(float), index, index, equalities).factor(entries)

@@ -10,13 +10,19 @@ t', t'', t''' those of time. Then (Eqs. 17 to 19, the last as differentiation gi
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.planning.collocation import Ratios
 from armtempo.planning.linear_rows import WindowRows
-from armtempo.planning.variables import MotionVariables, angle_basis, by_differences
+from armtempo.planning.variables import Index, MotionVariables, angle_basis, by_differences
 from armtempo.splines.trajectory import by_time
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 def ratios(angle: Array, time: Array, limits: Array) -> Array:
@@ -31,17 +37,19 @@ def ratios(angle: Array, time: Array, limits: Array) -> Array:
 def gradient(kind: int, angle: Array, time: Array) -> tuple[Array, Array]:
     """Derivatives of the speed (``kind`` 0), acceleration (1) or jerk (2) by q', q'', q''' and by t', t'', t'''.
 
-    ``angle`` and ``time`` hold these, (3, M) each. Returns (kind + 1, M) each; derivatives by the rest are 0.
+    ``angle`` and ``time`` hold the first kind + 1 of these at least, (.., M) each. Returns (kind + 1, M) each;
+    derivatives by the rest are 0.
     """
-    q1, q2, q3 = angle
-    t1, t2, t3 = time
+    q1, t1 = angle[0], time[0]
     i1 = 1.0 / t1
     i2 = i1 * i1
     if kind == 0:
         return i1[None], (-q1 * i2)[None]
+    q2, t2 = angle[1], time[1]
     i3, i4 = i2 * i1, i2 * i2
     if kind == 1:
         return np.stack([-t2 * i3, i2]), np.stack([3.0 * q1 * t2 * i4 - 2.0 * q2 * i3, -q1 * i3])
+    q3, t3 = angle[2], time[2]
     i5 = i4 * i1
     by_angle = np.stack([3.0 * t2**2 * i5 - t3 * i4, -3.0 * t2 * i4, i3])
     first = -3.0 * q3 * i4 + (12.0 * q2 * t2 + 4.0 * q1 * t3 - 15.0 * q1 * t2**2 * i1) * i5
@@ -49,52 +57,95 @@ def gradient(kind: int, angle: Array, time: Array) -> tuple[Array, Array]:
 
 
 class LimitRows:
-    """1 - ratio > 0, then 1 + ratio > 0, for R ratios; ``limits``: (J, 3)."""
+    """1 - ratio > 0, then 1 + ratio > 0, for R ratios sorted by kind; ``limits``: (J, 3).
+
+    ``order``: (R,), numbers of the sorted ratios among those given.
+    """
 
     linear = False
 
     def __init__(self, variables: MotionVariables, at: Ratios, limits: Array) -> None:
         self.count = 2 * len(at.kind)
-        self._kinds = [np.flatnonzero(at.kind == kind) for kind in range(3)]
-        self._limits = limits[at.joint, at.kind] * at.share
-        self._angle_basis = angle_basis(variables.degree, at.points.u)
-        self._time_basis = by_differences(self._angle_basis)
-        window = at.points.segment[:, None] + np.arange(variables.degree + 1)
-        self._angles = window + (at.joint * variables.angles)[:, None]
-        self._times = variables.difference_index[window[:, :-1]]
-        columns = np.concatenate([self._angles, self._times], axis=1)
-        group = at.points.segment * len(limits) + at.joint
-        self._windows = WindowRows(variables.size, columns, group)
+        self.order = np.argsort(at.kind, kind="stable")
+        ends = np.searchsorted(at.kind[self.order], range(1, 4)).tolist()
+        self._kinds = [slice(*ends) for ends in pairwise([0, *ends])]
+        self._limits = (limits[at.joint, at.kind] * at.share)[self.order]
+        segment, joint = at.points.segment[self.order], at.joint[self.order]
+        basis = angle_basis(variables.degree, at.points.u[self.order])
+        bases = basis, by_differences(basis)
+        self._angle_basis, self._time_basis = (
+            np.ascontiguousarray(np.moveaxis(each, 0, 2)) for each in bases
+        )
+        every = np.arange(variables.segments * len(limits))
+        windows = np.divmod(every, len(limits))
+        self._windows = WindowRows(
+            variables.size, self._columns(variables, *windows), segment * len(limits) + joint
+        )
         self.rows, self.columns = self._windows.rows, self._windows.columns
+        self._derive = self._derivative_matrix(variables, segment, joint)
+        self._known: tuple[Array, list[tuple[Array, Array]]] | None = None
+
+    @staticmethod
+    def _columns(variables: MotionVariables, segment: Index, joint: Index) -> Index:
+        """Variables that act on a joint in a segment, those of its angle first: (G, 2 k + 1)."""
+        window = segment[:, None] + np.arange(variables.degree + 1)
+        angles = window + (joint * variables.angles)[:, None]
+        return np.concatenate([angles, variables.difference_index[window[:, :-1]]], axis=1)
+
+    def _derivative_matrix(self, variables: MotionVariables, segment: Index, joint: Index) -> csr_array:
+        """Of each kind the derivatives of angles up to its order, each for all its ratios, then those of time."""
+        from scipy.sparse import csr_array  # imported here, because that takes longer than most commands
+
+        columns = self._columns(variables, segment, joint)
+        width = variables.degree + 1
+        data, indices, lengths = [], [], [0]
+        for kind, own in enumerate(self._kinds):
+            for basis, used in ((self._angle_basis, slice(width)), (self._time_basis, slice(width, None))):
+                count = own.stop - own.start
+                for order in range(kind + 1):
+                    data.append(basis[order, :, own].T.ravel())
+                    indices.append(columns[own, used].ravel())
+                    lengths += [basis.shape[1]] * count
+        starts = np.cumsum(lengths)
+        return csr_array(
+            (np.concatenate(data), np.concatenate(indices), starts), shape=(len(starts) - 1, variables.size)
+        )
 
     def values(self, x: Array) -> Array:
         """See ``motion_program.Block``."""
-        angle, time = self._derivatives(x)
-        ratio = np.empty(len(self._limits))
-        for kind, own in enumerate(self._kinds):
-            ratio[own] = by_time(angle[:, own], time[:, own], kind + 1)[kind]
+        ratio = np.concatenate(
+            [by_time(angle, time, kind + 1)[kind] for kind, (angle, time) in enumerate(self._derivatives(x))]
+        )
         ratio /= self._limits
         return np.concatenate([1.0 - ratio, 1.0 + ratio])
 
     def linearise(self, x: Array) -> LinearisedLimits:
         """Their derivatives at x."""
-        angle, time = self._derivatives(x)
-        by_angle, by_time = np.zeros((2, 3, len(self._limits)))
-        for kind, own in enumerate(self._kinds):
-            by_angle[: kind + 1, own], by_time[: kind + 1, own] = gradient(kind, angle[:, own], time[:, own])
-        weights = np.concatenate(
-            [
-                np.einsum("kr,rkc->rc", by_angle / self._limits, self._angle_basis),
-                np.einsum("kr,rkc->rc", by_time / self._limits, self._time_basis),
-            ],
-            axis=1,
-        )
-        return LinearisedLimits(self._windows, weights)
+        angles = self._angle_basis.shape[1]
+        weights = np.empty((angles + self._time_basis.shape[1], len(self._limits)))
+        for kind, (own, at) in enumerate(zip(self._kinds, self._derivatives(x), strict=True)):
+            for slopes, basis, part in zip(
+                gradient(kind, *at),
+                (self._angle_basis, self._time_basis),
+                (weights[:angles, own], weights[angles:, own]),
+                strict=True,
+            ):
+                slopes = slopes / self._limits[own]
+                np.multiply(slopes[0], basis[0, :, own], out=part)
+                for order in range(1, kind + 1):
+                    part += slopes[order] * basis[order, :, own]
+        return LinearisedLimits(self._windows, np.ascontiguousarray(weights.T))
 
-    def _derivatives(self, x: Array) -> tuple[Array, Array]:
-        """q', q'', q''' and t', t'', t''' for each ratio: (3, R) each."""
-        angle = np.einsum("rkc,rc->kr", self._angle_basis, x[self._angles])
-        return angle, np.einsum("rkc,rc->kr", self._time_basis, x[self._times])
+    def _derivatives(self, x: Array) -> list[tuple[Array, Array]]:
+        """Of each kind k, in order from 0, the first k + 1 derivatives of angles and times: (k + 1, R_k) each."""
+        if self._known is None or self._known[0] is not x:
+            found, flat, end = [], self._derive @ x, 0
+            for kind, own in enumerate(self._kinds):
+                start, end = end, end + 2 * (kind + 1) * (own.stop - own.start)
+                angle, time = flat[start:end].reshape(2, kind + 1, -1)
+                found.append((angle, time))
+            self._known = x, found
+        return self._known[1]
 
 
 class LinearisedLimits:
@@ -103,6 +154,7 @@ class LinearisedLimits:
     def __init__(self, windows: WindowRows, weights: Array) -> None:
         self._windows, self._weights = windows, weights
         self._matrix = windows.matrix(weights)
+        self._transposed = self._matrix.T
 
     def forward(self, step: Array) -> Array:
         change = np.asarray(self._matrix @ step)
@@ -110,7 +162,7 @@ class LinearisedLimits:
 
     def backward(self, weights: Array) -> Array:
         upper, lower = np.split(weights, 2)
-        return np.asarray(self._matrix.T @ (lower - upper))
+        return np.asarray(self._transposed @ (lower - upper))
 
     def hessian(self, weights: Array, _: Array, __: bool) -> Array:
         """See there, without the second derivatives; the entries are at ``LimitRows.rows`` and ``columns``."""

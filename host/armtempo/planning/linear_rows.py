@@ -13,43 +13,53 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 _CHUNK = 8
-"""Rows of the same variables whose products are summed together."""
+"""Sums over the same window whose products are computed together."""
 
 
 class WindowRows:
-    """Rows ``weights`` (R, w) of the variables ``columns`` (R, w), with products summed for rows of the same group.
+    """Weighted sums of the variables in windows (G, w), with products summed for all sums of the same window.
 
-    ``size``: number of variables; ``group``: (R,), rows of one group have the same variables.
+    ``size``: number of variables; ``of_row``: (R,), the window of each sum.
     """
 
-    def __init__(self, size: int, columns: Index, group: Index) -> None:
-        self._size = size
-        self._indices = columns.ravel().astype(np.int32)
-        self._starts = columns.shape[1] * np.arange(len(columns) + 1, dtype=np.int32)
-        order = np.argsort(group, kind="stable")
-        starts = np.flatnonzero(np.diff(group[order], prepend=-1))
+    def __init__(self, size: int, windows: Index, of_row: Index) -> None:
+        self._size, (count, width) = size, windows.shape
+        self._indices = windows[of_row].ravel().astype(np.int32)
+        self._starts = width * np.arange(len(of_row) + 1, dtype=np.int32)
+        order = np.argsort(of_row, kind="stable")
+        starts = np.flatnonzero(np.diff(of_row[order], prepend=-1))
         place = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
         chunk = np.cumsum(place % _CHUNK == 0) - 1
-        count = int(chunk[-1]) + 1 if len(chunk) else 0
-        self._chunks = np.full((count, _CHUNK), len(order))
-        """Rows of each chunk; R stands for none."""
+        self._chunks = np.full((int(chunk[-1]) + 1 if len(chunk) else 0, _CHUNK), len(order))
+        """Sums of each chunk; R stands for none."""
         self._chunks[chunk, place % _CHUNK] = order
-        own, width = columns[self._chunks[:, 0]], columns.shape[1]
-        self.rows = np.repeat(own, width, axis=1).ravel()
-        self.columns = np.tile(own, (1, width)).ravel()
+        firsts, used = chunk[starts], of_row[order[starts]]
+        counts = np.diff(firsts, append=len(self._chunks))
+        self._added = [
+            (used[counts > number], firsts[counts > number] + number)
+            for number in range(int(counts.max(initial=0)))
+        ]
+        """Windows that have a first chunk, a second and so on, and these chunks."""
+        self._shape = count, width * width
+        self.rows = np.repeat(windows, width, axis=1).ravel()
+        self.columns = np.tile(windows, (1, width)).ravel()
 
     def matrix(self, weights: Array) -> csr_array:
-        """The rows: (R, size)."""
+        """The sums' weights (R, w) as rows of a matrix: (R, size)."""
         from scipy.sparse import csr_array  # imported here, because that takes longer than most commands
 
         return csr_array((weights.ravel(), self._indices, self._starts), shape=(len(weights), self._size))
 
     def hessian(self, weights: Array, of_rows: Array) -> Array:
-        """Sums of the rows' outer products with factors (R,), at ``rows`` and ``columns``."""
-        both = np.zeros((2, len(weights) + 1, weights.shape[1]))
-        both[0, :-1], both[1, :-1] = weights, weights * of_rows[:, None]
-        left, right = both[0][self._chunks], both[1][self._chunks]
-        return np.asarray((left.swapaxes(1, 2) @ right).ravel())
+        """Sums of the outer products of weights (R, w) with factors >= 0 (R,), at ``rows`` and ``columns``."""
+        scaled = np.zeros((len(weights) + 1, weights.shape[1]))
+        scaled[:-1] = weights * np.sqrt(of_rows)[:, None]
+        each = scaled[self._chunks]
+        products = (each.swapaxes(1, 2) @ each).reshape(len(each), -1)
+        found = np.zeros(self._shape)
+        for used, chunks in self._added:
+            found[used] += products[chunks]
+        return found.ravel()
 
 
 class LinearRows:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.optimise.interior_point import Linearised
+from armtempo.optimise.interior_point import Kkt, Linearised
 from armtempo.optimise.kkt import BandedKkt, Equalities
+from armtempo.optimise.reduced_kkt import ReducedKkt
 from armtempo.planning.linear_rows import LinearRows
 from armtempo.planning.variables import Index, MotionVariables, time_basis
 
@@ -44,7 +45,7 @@ class MotionProgram:
 
     Different control points of angle and time can give the same motion; the ``smoothing`` weight of each
     step, (S + k - 2,), selects one. ``blocks``: the inequalities, in addition to time differences above
-    ``least``.
+    ``least``. ``kkt``: of another program whose blocks and equalities have their entries at the same positions.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class MotionProgram:
         equalities: Equalities,
         smoothing: Array | None = None,
         least: float = 0.0,
+        kkt: Kkt | None = None,
     ) -> None:
         self.variables, self.equalities = variables, equalities
         index = variables.difference_index
@@ -65,10 +67,16 @@ class MotionProgram:
         self._smoothing = np.zeros(len(index) - 1) if smoothing is None else smoothing
         self._time = np.zeros(variables.size)
         self._time[index] = time_weights(variables) / variables.segments
+        self.kkt = self._kkt() if kkt is None else kkt
+
+    def _kkt(self) -> Kkt:
+        """Newton's equations. Without second derivatives, which only fixed paths use, the Hessian is definite."""
+        index = self.variables.difference_index
         left, right = index[:-1], index[1:]
         rows = [left, right, left, right, *(block.rows for block in self.blocks)]
         columns = [left, right, right, left, *(block.columns for block in self.blocks)]
-        self.kkt = BandedKkt(variables.places, np.concatenate(rows), np.concatenate(columns), equalities)
+        solver = ReducedKkt if self.variables.joints else BandedKkt
+        return solver(self.variables.places, np.concatenate(rows), np.concatenate(columns), self.equalities)
 
     @property
     def linear(self) -> NDArray[np.bool_]:

@@ -60,27 +60,29 @@ _LEAST_TIME = 1e-3
 _ROUNDING = 1e-9
 """Bound of the rounding error of E, relative to the sum of its terms."""
 
-_INNER = 3 * _CELLS - 1
-"""Multipliers of a joint inside a leg: h, k and l between cells, middle Bernstein coefficients of l. After them
-come k and l at the start and at the end."""
-_COLUMNS = _INNER + 4
-_K = np.array([_INNER, *range(1, _CELLS), _INNER + 2])
-_L = np.array([_INNER + 1, *range(_CELLS, 2 * _CELLS - 1), _INNER + 3])
+_COLUMNS = 3 * _CELLS + 3
+"""Multipliers of a joint in a leg. Cell by cell k and l at its start and the middle Bernstein coefficient of l, then h,
+then k and l at the end of the leg."""
+_K = np.array([*range(0, 3 * _CELLS, 3), _COLUMNS - 2])
+_L = _K + 1
 """Indices of k and l at the ends of the cells, from start to end."""
+_MIDDLE = _L[:-1] + 1
+_H = 3 * _CELLS
+_INNER, _ENDS = slice(2, _H + 1), np.array([0, 1, _COLUMNS - 2, _COLUMNS - 1])
+"""Multipliers inside a leg, and k and l at its ends."""
+_CELL = np.stack([_K[:-1], _L[:-1], _MIDDLE, _K[1:], _L[1:], np.full(_CELLS, _H)], axis=1)
+"""Multipliers that act on each cell: (N, 6)."""
 
 
 def _patterns() -> Array:
-    """Rows of the absolute values' arguments: (5, 6 N, C), to be multiplied by T V, V, T A, A and T J."""
-    cells = _CELLS
-    found = np.zeros((5, 6 * cells, _COLUMNS))
-    for cell in range(cells):
-        row, middle = 6 * cell, 2 * cells - 1 + cell
-        found[0, row, 0] = 1.0 / cells
-        found[1, row, [_K[cell], _K[cell + 1]]] = -1.0, 1.0
-        for end, (first, second) in enumerate(((_L[cell], middle), (middle, _L[cell + 1])), 1):
-            found[2, row + end, _K[cell + end - 1]] = 0.5 / cells
-            found[3, row + end, [first, second]] = -1.0, 1.0
-        found[4, range(row + 3, row + 6), [_L[cell], middle, _L[cell + 1]]] = 1.0 / (3 * cells)
+    """Rows of the absolute values' arguments in a cell: (5, 6, 6), to be multiplied by T V, V, T A, A and T J."""
+    found = np.zeros((5, 6, 6))
+    found[0, 0, 5] = 1.0 / _CELLS
+    found[1, 0, [0, 3]] = -1.0, 1.0
+    for row, (k, first, second) in enumerate(((0, 1, 2), (3, 2, 4)), 1):
+        found[2, row, k] = 0.5 / _CELLS
+        found[3, row, [first, second]] = -1.0, 1.0
+    found[4, range(3, 6), [1, 2, 4]] = 1.0 / (3 * _CELLS)
     return found
 
 
@@ -116,7 +118,7 @@ def lower_bound_s(via_deg: Array, limits: Array, times_s: Array, rests: bool = T
 class _Cost:
     """E as a function of the multipliers x (..., J, C), for any legs and durations.
 
-    ``distances``: (..., J); ``times``: (...); ``rows``: (..., J, 6 N, C).
+    ``distances``: (..., J); ``times``: (...); ``rows``: (..., J, 6, 6), the same in each cell.
     """
 
     distances: Array
@@ -137,31 +139,45 @@ class _Cost:
         return _Cost(self.distances[which], self.times[which], self.rows[which])
 
     def arguments(self, x: Array) -> Array:
-        """Arguments of the absolute values: (..., J, 6 N)."""
-        return np.asarray((self.rows @ x[..., None])[..., 0])
+        """Arguments of the absolute values: (..., J, N, 6)."""
+        return np.asarray(x[..., _CELL] @ self.rows.swapaxes(-1, -2))
 
     def exact(self, x: Array, arguments: Array) -> Array:
         """E, rounded downwards: (...)."""
-        gained, lost = self.distances * x[..., 0], np.abs(arguments).sum(axis=-1)
-        terms = np.abs(gained) + np.sum(np.abs(self.rows) @ np.abs(x)[..., None], axis=(-1, -2))
+        gained, lost = self.distances * x[..., _H], np.abs(arguments).sum(axis=(-1, -2))
+        largest = np.abs(x)[..., _CELL] @ np.abs(self.rows).swapaxes(-1, -2)
+        terms = np.abs(gained) + largest.sum(axis=(-1, -2))
         return np.asarray(self.times + np.sum(gained - lost - _ROUNDING * terms, axis=-1))
 
     def smooth(self, x: Array, arguments: Array, smoothing: float) -> Array:
         """E minus the duration, by joint, with smoothed absolute values; slightly too large: (..., J)."""
         root = np.sqrt(smoothing**2 + arguments**2)
         lost = root - smoothing + smoothing * np.log(2.0 * smoothing / (root + smoothing))
-        return np.asarray(self.distances * x[..., 0] - lost.sum(axis=-1))
+        return np.asarray(self.distances * x[..., _H] - lost.sum(axis=(-1, -2)))
 
     def derivatives(self, arguments: Array, smoothing: float) -> tuple[Array, Array]:
         """Of ``smooth``: gradient (..., J, C) and negative Hessian (..., J, C, C)."""
         root = np.sqrt(smoothing**2 + arguments**2)
-        gradient = -((arguments / (smoothing + root))[..., None, :] @ self.rows)[..., 0, :]
-        gradient[..., 0] += self.distances
-        weighted = self.rows * np.sqrt(smoothing / (root * (smoothing + root)))[..., None]
-        curvature = weighted.swapaxes(-1, -2) @ weighted
+        by_cell = -(arguments / (smoothing + root)) @ self.rows
+        gradient = np.zeros((*arguments.shape[:-2], _COLUMNS))
+        for number in range(5):
+            gradient[..., _CELL[:, number]] += by_cell[..., number]
+        gradient[..., _H] = by_cell[..., 5].sum(axis=-1) + self.distances
+        outer = (self.rows[..., :, None] * self.rows[..., None, :]).reshape(*self.rows.shape[:-1], 36)
+        bent = ((smoothing / (root * (smoothing + root))) @ outer).reshape(*arguments.shape[:-1], 6, 6)
+        curvature = np.zeros((*gradient.shape, _COLUMNS))
+        for number in range(5):
+            curvature[..., _H, _CELL[:, number]] += bent[..., 5, number]
+        curvature[..., _H] = curvature[..., _H, :]
+        curvature[..., _H, _H] = bent[..., 5, 5].sum(axis=-1)
+        for cell in range(_CELLS - 1):
+            own = slice(3 * cell, 3 * cell + 5)
+            curvature[..., own, own] += bent[..., cell, :5, :5]
+        last = _CELL[-1, :5]
+        curvature[..., last[:, None], last] += bent[..., -1, :5, :5]
         diagonal = np.arange(_COLUMNS)
         curvature[..., diagonal, diagonal] *= 1.0 + 1e-12
-        curvature[..., 0, 0] += np.finfo(float).tiny  # at duration 0 h has no effect
+        curvature[..., _H, _H] += np.finfo(float).tiny  # at duration 0 h has no effect
         return gradient, curvature
 
 
@@ -218,13 +234,13 @@ def _step(weight: Array, smoothing: float, gradient: Array, curvature: Array, re
 
     ``weight``: (n, M), of each duration. A banded system of k and l at the via points remains.
     """
-    inner, outer = slice(0, _INNER), slice(_INNER, None)
-    right = np.concatenate([gradient[..., inner, None], curvature[..., inner, outer]], axis=-1)
-    solved = np.linalg.solve(curvature[..., inner, inner], right)
+    across = curvature[..., _INNER, :][..., _ENDS]
+    right = np.concatenate([gradient[..., _INNER, None], across], axis=-1)
+    solved = np.linalg.solve(curvature[..., _INNER, _INNER], right)
     own, by_ends = solved[..., 0], solved[..., 1:]
-    left = curvature[..., outer, outer] - curvature[..., outer, inner] @ by_ends
-    rise = gradient[..., outer] - (curvature[..., outer, inner] @ own[..., None])[..., 0]
-    gain = np.sum(gradient[..., inner] * own, axis=(-1, -2))
+    left = curvature[..., _ENDS[:, None], _ENDS] - across.swapaxes(-1, -2) @ by_ends
+    rise = gradient[..., _ENDS] - (across.swapaxes(-1, -2) @ own[..., None])[..., 0]
+    gain = np.sum(gradient[..., _INNER] * own, axis=(-1, -2))
     loose = 1.0 / (gain / weight + smoothing / weight**2)
     count, times, joints, _ = rise.shape
     rise = rise.reshape(count, times, -1)
@@ -243,8 +259,8 @@ def _step(weight: Array, smoothing: float, gradient: Array, curvature: Array, re
     level = short + np.sum(mean * flat, axis=1) / whole
     later = loose * (smoothing / weight - np.einsum("imc,ic->im", rise, flat) + level[:, None])
     step = np.empty(gradient.shape)
-    step[..., inner] = (later / weight)[..., None, None] * own - (by_ends @ ends[:, None, ..., None])[..., 0]
-    step[..., outer] = ends[:, None]
+    step[..., _INNER] = (later / weight)[..., None, None] * own - (by_ends @ ends[:, None, ..., None])[..., 0]
+    step[..., _ENDS] = ends[:, None]
     return step
 
 
@@ -332,9 +348,9 @@ class _Scan:
         speed, acceleration, jerk = self._limits.T
         change = np.abs(np.diff(self.x, axis=0))
         k, l_ = change[..., _K], change[..., _L]
-        middle = change[..., 2 * _CELLS - 1 : _INNER].sum(axis=-1)
+        middle = change[..., _MIDDLE].sum(axis=-1)
         by_joint = (
-            speed * change[..., 0]
+            speed * change[..., _H]
             + (
                 acceleration * 0.5 * (k[..., 1:] + k[..., :-1]).sum(axis=-1)
                 + jerk / 3.0 * ((l_[..., 1:] + l_[..., :-1]).sum(axis=-1) + middle)
@@ -353,9 +369,9 @@ class _Scan:
         row = np.searchsorted(self.leg, np.arange(len(self._distances)), side="right") - 1
         speed, acceleration, jerk = self._limits.T[:, None, :, None]
         x = np.abs(self.x[row])
-        waiting = np.min(speed * x[..., :1] + acceleration * x[..., _K] + jerk * x[..., _L], axis=-1).sum(
-            axis=-1
-        )
+        waiting = np.min(
+            speed * x[..., _H, None] + acceleration * x[..., _K] + jerk * x[..., _L], axis=-1
+        ).sum(axis=-1)
         waits = np.where(waiting <= 1.0 - _ROUNDING, self.e[row], -np.inf)
         # Or h is 0, and k and l drop to 0 at once.
         ends = (speed * x[..., _K[[0, -1]]] + acceleration * x[..., _L[[0, -1]]]).sum(axis=(-1, -2))
@@ -383,13 +399,13 @@ def _improved(cost: _Cost, x: Array, target: Array) -> tuple[Array, Array]:
         arguments = own.arguments(here)
         gradient, curvature = own.derivatives(arguments, smoothing)
         step = np.zeros(here.shape)
-        local = slice(0, _INNER)
-        step[..., local] = np.linalg.solve(curvature[..., local, local], gradient[..., local, None])[..., 0]
+        inner = np.linalg.solve(curvature[..., _INNER, _INNER], gradient[..., _INNER, None])
+        step[..., _INNER] = inner[..., 0]
         change, slope = own.arguments(step), np.sum(step * gradient, axis=-1)
         start, length = own.smooth(here, arguments, smoothing), np.ones(slope.shape)
         for _ in range(20):
             far = length[..., None]
-            reached = own.smooth(here + far * step, arguments + far * change, smoothing)
+            reached = own.smooth(here + far * step, arguments + far[..., None] * change, smoothing)
             short = ~(reached >= start + _ARMIJO * length * slope)
             if not short.any():
                 break

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.planning.linear_rows import LinearRows
-from armtempo.planning.variables import Index, MotionVariables
 from armtempo.splines import bernstein, bspline
 
 
@@ -24,34 +20,71 @@ def of_path(angle_points: Array, degree: int) -> Array:
     return np.asarray(np.einsum("bc,sjc->sbj", coefficients(degree), windows))
 
 
-@dataclass(frozen=True, eq=False)
-class Forms:
-    """Bernstein coefficients as weighted sums of variables, with their bounds; see ``LinearRows``."""
+class AngleRows:
+    """low < coefficient < high for all Bernstein coefficients; where a bound is infinite there is no inequality.
 
-    columns: Index
-    weights: Array
-    low: Array
-    high: Array
-
-    def rows(self, variables: MotionVariables) -> LinearRows:
-        """The inequalities."""
-        return LinearRows(variables.size, self.columns, self.weights, self.low, self.high)
-
-
-def forms(variables: MotionVariables, low: Array, high: Array) -> Forms:
-    """All Bernstein coefficients, between ``low`` and ``high``, each (S, k + 1, J).
-
-    A coefficient that two segments share is there twice; that of the second counts.
+    The first J (S + degree) of ``size`` variables are the control points, joint by joint; ``low`` and ``high``: (S,
+    degree + 1, J). A coefficient that two segments share counts as one of the second. See ``motion_program.Block``.
     """
-    count = variables.degree + 1
-    segment = np.arange(variables.segments)
-    columns, weights, lows, highs = [], [], [], []
-    for joint in range(variables.joints):
-        control = variables.angle_index(joint)[segment[:, None] + np.arange(count)]
-        for number, row in enumerate(coefficients(variables.degree)):
-            own = slice(None) if number < count - 1 else slice(-1, None)
-            columns.append(control[own])
-            weights.append(np.broadcast_to(row, control[own].shape))
-            lows.append(low[own, number, joint])
-            highs.append(high[own, number, joint])
-    return Forms(*(np.concatenate(parts) for parts in (columns, weights, lows, highs)))
+
+    linear = True
+
+    def __init__(self, size: int, low: Array, high: Array) -> None:
+        self._size = size
+        self._segments, count, self._joints = low.shape
+        own = np.ones((self._joints, self._segments, count), dtype=bool)
+        own[:, :-1, -1] = False
+        low, high = (np.moveaxis(each, 2, 0) for each in (low, high))
+        self._lower, self._upper = (np.flatnonzero(own & np.isfinite(each)) for each in (low, high))
+        self._low, self._high = low.ravel()[self._lower], high.ravel()[self._upper]
+        self.count = len(self._lower) + len(self._upper)
+        self._weights = coefficients(count - 1)
+        self._products = (self._weights[:, :, None] * self._weights[:, None, :]).reshape(count, -1)
+        joint, segment = np.divmod(np.arange(self._joints * self._segments), self._segments)
+        window = (joint * (self._segments + count - 1) + segment)[:, None] + np.arange(count)
+        self.rows = np.repeat(window, count, axis=1).ravel()
+        self.columns = np.tile(window, (1, count)).ravel()
+
+    def values(self, x: Array) -> Array:
+        """How far each coefficient is above its low bound, then below its high bound."""
+        at = self._coefficients(x)
+        return np.concatenate([at[self._lower] - self._low, self._high - at[self._upper]])
+
+    def linearise(self, _: Array) -> AngleRows:
+        """Their derivatives, the same everywhere."""
+        return self
+
+    def forward(self, step: Array) -> Array:
+        """See ``optimise.interior_point.Linearised``."""
+        at = self._coefficients(step)
+        return np.concatenate([at[self._lower], -at[self._upper]])
+
+    def backward(self, weights: Array) -> Array:
+        by_window = (self._by_coefficient(weights, -1.0) @ self._weights).reshape(
+            self._joints, self._segments, -1
+        )
+        found = np.zeros(self._size)
+        count = by_window.shape[2]
+        points = found[: self._joints * (self._segments + count - 1)].reshape(self._joints, -1)
+        for number in range(count):
+            points[:, number : number + self._segments] += by_window[..., number]
+        return found
+
+    def hessian(self, weights: Array, _: Array, __: bool) -> Array:
+        """See there; the entries are at ``rows`` and ``columns``."""
+        return np.asarray((self._by_coefficient(weights, 1.0) @ self._products).ravel())
+
+    def _coefficients(self, x: Array) -> Array:
+        """All of them: (J S (degree + 1),)."""
+        count = len(self._weights)
+        points = x[: self._joints * (self._segments + count - 1)].reshape(self._joints, -1)
+        windows = np.lib.stride_tricks.sliding_window_view(points, count, axis=1)
+        return np.asarray((windows.reshape(-1, count) @ self._weights.T).ravel())
+
+    def _by_coefficient(self, weights: Array, sign: float) -> Array:
+        """Of each coefficient what its inequalities weigh, the upper one with a sign: (J S, degree + 1)."""
+        found = np.zeros(self._joints * self._segments * len(self._weights))
+        split = len(self._lower)
+        found[self._lower] = weights[:split]
+        found[self._upper] += sign * weights[split:]
+        return found.reshape(-1, len(self._weights))

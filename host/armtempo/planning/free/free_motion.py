@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 from armtempo.optimise import interior_point, slack_method
-from armtempo.optimise.interior_point import Schedule
+from armtempo.optimise.interior_point import Kkt, Schedule
 from armtempo.optimise.kkt import BandedKkt, Equalities
 from armtempo.optimise.slack_method import Goal
 from armtempo.planning import collocation
 from armtempo.planning.collocation import Curve, Points, Ratios
 from armtempo.planning.free import angle_bounds
+from armtempo.planning.free.angle_bounds import AngleRows
 from armtempo.planning.free.layout import DEGREE, DWELL_SEGMENTS, Layout, Vias
 from armtempo.planning.free.tool_rows import ToolRows, ToolTargets
 from armtempo.planning.limit_rows import LimitRows
@@ -27,7 +28,7 @@ from armtempo.planning.tool import Tool
 from armtempo.planning.variables import MotionVariables, time_points
 from armtempo.splines import bspline
 
-_PARTS, _COARSE_PARTS = (1, 2, 4), (4, 4, 4)
+_PARTS, _COARSE_PARTS = (1, 2, 5), (4, 4, 4)
 """Points per segment at which speed, acceleration and jerk are kept besides peaks: on many segments, and on few."""
 _FINE = 16
 """Segments per via point that are many."""
@@ -254,6 +255,7 @@ class Improver:
         self._size = demand.size_deg
         self._low, self._high = bounds(demand, layout)
         self._targets = _targets(demand, layout)
+        self._kkt: Kkt | None = None
 
     def improved(self, motion: FreeMotion, rounds: int) -> FreeMotion:
         """The motion after ``rounds`` solves, each with the peaks of the previous one; never slower than
@@ -329,7 +331,7 @@ class Improver:
         at, near = angle_bounds.of_path(motion.angle_points_deg, DEGREE), _NEARBY * self._size
         low = np.where(at - near < self._low, self._low, -np.inf)
         high = np.where(at + near > self._high, self._high, np.inf)
-        return angle_bounds.forms(self.variables, low / self._size, high / self._size).rows(self.variables)
+        return AngleRows(self.variables.size, low / self._size, high / self._size)
 
     def _solve(
         self, motion: FreeMotion, at: Ratios, scale: float, known: Array, careful: bool
@@ -346,12 +348,14 @@ class Improver:
         steps = motion.differences_s / unit_s * (1.0 + min(2.0 * excess + _LEAST_AWAY, _AWAY))
         least = min(_LEAST_STEP, 0.5 * float(steps.min()))
         start = self.variables.pack(motion.angle_points_deg / self._size, steps)
-        blocks: list[Block] = [LimitRows(self.variables, at, limits), self.angle_rows(motion)]
+        limit_rows = LimitRows(self.variables, at, limits)
+        blocks: list[Block] = [limit_rows, self.angle_rows(motion)]
         if (tool_rows := self._tool_rows(_TOOL_KEPT)) is not None:
             blocks.append(tool_rows)
-        program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing, least)
+        program = MotionProgram(self.variables, blocks, self.equalities(unit_s), smoothing, least, self._kkt)
+        self._kkt = program.kkt
         multipliers = np.full(len(program.linear), np.nan)
-        multipliers[: known.size] = known.ravel()
+        multipliers[: known.size] = known[:, limit_rows.order].ravel()
         if careful:
             x = interior_point.minimise(program, start, _CAREFUL).x
         else:
@@ -365,7 +369,9 @@ class Improver:
             # a dwell much shorter than the segments next to it may be missed; then it lasts longer
             differences_s=np.maximum(self.variables.time_differences(x), least) * unit_s,
         )
-        return solved, multipliers[: known.size].reshape(2, -1)
+        found = np.empty_like(known)
+        found[:, limit_rows.order] = multipliers[: known.size].reshape(2, -1)
+        return solved, found
 
     def _smoothing(self) -> Array:
         """Weights of the steps between time differences; none where a dwell begins and ends."""
@@ -395,7 +401,11 @@ def met(variables: MotionVariables, equalities: Equalities, x: Array, smooth: bo
     if smooth:
         bent = x[window] @ third
         np.add.at(gradient, window, np.outer(bent, third))
-    kkt = BandedKkt(variables.places, rows, columns, equalities)
+    # nothing couples the joints: one after the other, the band is as narrow as that of one
+    apart = (variables.angles + 1.0) * (np.arange(variables.size) // variables.angles)
+    firsts = equalities.column[np.searchsorted(equalities.row, np.arange(equalities.count))]
+    placed = replace(equalities, places=equalities.places + apart[firsts])
+    kkt = BandedKkt(variables.places + apart, rows, columns, placed)
     try:
         factor = kkt.factor(entries)
     except np.linalg.LinAlgError:

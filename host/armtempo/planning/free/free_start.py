@@ -12,7 +12,7 @@ from armtempo.optimise import interior_point
 from armtempo.optimise.interior_point import Linearised, Schedule
 from armtempo.optimise.kkt import BandedKkt, Equalities
 from armtempo.planning.free import angle_bounds
-from armtempo.planning.free.angle_bounds import Forms
+from armtempo.planning.free.angle_bounds import AngleRows
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Improver, bounds, met
 from armtempo.planning.free.layout import DEGREE, Layout, Vias, uniform
 from armtempo.planning.linear_rows import LinearRows
@@ -124,11 +124,11 @@ def _inside(demand: Demand, motion: FreeMotion) -> FreeMotion:
     vias = Vias(demand.via_deg / size, demand.turning)
     for joint, name in enumerate(demand.names):
         one = slice(joint, joint + 1)
-        forms = angle_bounds.forms(variables, low[..., one] / size[joint], high[..., one] / size[joint])
+        allowed = low[..., one] / size[joint], high[..., one] / size[joint]
         fixed = layout.angle_equalities(variables, vias.joint(joint))
         margins = demand.margin_deg[~demand.turning[:, joint], joint]
         margin = min(margins.min(initial=np.inf), demand.corridor_deg) / size[joint]
-        found = _nearest(forms, margin, fixed, points[:, joint] / size[joint])
+        found = _nearest(allowed, margin, fixed, points[:, joint] / size[joint])
         if found is None:
             raise PlanError(
                 f"{name}: no path with {layout.pieces.min()} pieces between via points stays within its range and "
@@ -139,8 +139,9 @@ def _inside(demand: Demand, motion: FreeMotion) -> FreeMotion:
     return replace(motion, angle_points_deg=points)
 
 
-def _nearest(forms: Forms, margin: float, fixed: Equalities, wanted: Array) -> Array | None:
-    """Control points (C,) that meet ``fixed``, keep each form within its bounds, and are nearest to ``wanted`` (C,).
+def _nearest(allowed: tuple[Array, Array], margin: float, fixed: Equalities, wanted: Array) -> Array | None:
+    """Control points (C,) that meet ``fixed``, keep their Bernstein coefficients within the lowest and highest
+    ``allowed``, (S, 6, 1) each, and are nearest to ``wanted`` (C,).
 
     The distance is the sum of squared third differences. The bounds are first widened until ``wanted``, which
     meets ``fixed``, keeps them, and then narrowed again around their middle until the path keeps a margin, a
@@ -148,37 +149,41 @@ def _nearest(forms: Forms, margin: float, fixed: Equalities, wanted: Array) -> A
     possible.
     """
     x, margin = wanted, min(_MARGIN * margin, _MOST_MARGIN)
-    excess = _excess(forms, x) + margin
+    excess = _excess(allowed, x) + margin
     if excess < min(margin - _TOO_NEAR, 0.0):
         return x
     for _ in range(_STEPS):
         if excess <= 0.5 * margin:
             break
-        program = _Alike(forms, _WIDER * excess - margin, fixed, wanted)
+        program = _Alike(allowed, _WIDER * excess - margin, fixed, wanted)
         x = interior_point.minimise(program, x, _CENTRE).x
-        before, excess = excess, _excess(forms, x) + margin
+        before, excess = excess, _excess(allowed, x) + margin
         if not excess < _BETTER * before:
             return None
-    program = _Alike(forms, 0.0, fixed, wanted)
+    program = _Alike(allowed, 0.0, fixed, wanted)
     found = interior_point.minimise(program, x, _NEAR)
-    if found.iterations and _excess(forms, found.x) > -_TOO_NEAR:
+    if found.iterations and _excess(allowed, found.x) > -_TOO_NEAR:
         found = interior_point.minimise(program, x, _OFF)
     return found.x if found.iterations else None
 
 
-def _excess(forms: Forms, x: Array) -> float:
-    """Largest excess of a form over its bounds; negative if all are inside."""
-    sums = np.sum(forms.weights * x[forms.columns], axis=1)
-    return float(np.max(np.maximum(forms.low - sums, sums - forms.high)))
+def _excess(allowed: tuple[Array, Array], x: Array) -> float:
+    """Largest excess of a Bernstein coefficient over its bounds; negative if all are inside."""
+    low, high = allowed
+    at = angle_bounds.of_path(x[:, None], DEGREE)
+    return float(np.max(np.maximum(low - at, at - high)))
 
 
 class _Alike:
     """The program: relative squared third differences from ``wanted``, within widened bounds."""
 
-    def __init__(self, forms: Forms, wider: float, equalities: Equalities, wanted: Array) -> None:
+    def __init__(
+        self, allowed: tuple[Array, Array], wider: float, equalities: Equalities, wanted: Array
+    ) -> None:
         self.equalities, self._wanted = equalities, wanted
         count = len(wanted)
-        bounds = LinearRows(count, forms.columns, forms.weights, forms.low - wider, forms.high + wider)
+        low, high = allowed
+        bounds = AngleRows(count, low - wider, high + wider)
         self._bounds = bounds
         self._scale = 1.0 / max(float(np.sum(np.diff(wanted, 3) ** 2)), 1e-300)
         self._third = LinearRows(
@@ -207,7 +212,7 @@ class _Alike:
 
 
 class _Linearised:
-    def __init__(self, bounds: LinearRows, third: LinearRows, scale: float, gradient: Array) -> None:
+    def __init__(self, bounds: AngleRows, third: LinearRows, scale: float, gradient: Array) -> None:
         self.gradient, self._bounds, self._third, self._scale = gradient, bounds, third, scale
 
     def forward(self, step: Array) -> Array:
