@@ -277,7 +277,9 @@ def test_check_needs_no_board(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["pick_place.py", "pallet.py", "polling.py", "alone.py"])
 def test_the_pages_examples_fit_on_the_chip(name: str, tmp_path: Path) -> None:
     found = UserProgram.load(example(name, tmp_path), with_switches(1, 2, 3))
-    assert needed_bytes(len(found.marked.encode())) <= CHIP_BYTES
+    heap = encoded_program.EncodedProgram(found, ARM, (), b"").heap_bytes
+    assert needed_bytes(len(found.marked.encode())) <= heap <= CHIP_BYTES
+    assert (heap > needed_bytes(len(found.marked.encode()))) == bool(found.homes)
 
 
 class Small:

@@ -72,7 +72,7 @@ def _wear(state: BoardState) -> list[str]:
     if not state.erasures:
         return []
     counts = ", ".join(f"{sector}: {count}" for sector, count in sorted(state.erasures.items()))
-    return [f"wear      erasures by sector of the flash: {counts}; a chip's is good for 10 000"]
+    return [f"wear      erasures by sector of the flash: {counts}; a chip's is good for 10000"]
 
 
 def _measured(state: BoardState) -> str:
