@@ -52,7 +52,9 @@ EACH = "__each__"
 HEAP_BYTES = 16_000
 """Heap that a program needs besides its own: its interface, and the start of a motion,"""
 HEAP_PER_BYTE = 8
-"""and for each byte of the source, most of it while it is compiled (host/docs/measurements.md)."""
+"""and for each byte of the source, most of it while it is compiled (host/docs/measurements.md);"""
+HOMING_BYTES = 4_500
+"""and if it homes the arm."""
 _HEAD = "<4sIHH"
 HEAD_BYTES = struct.calcsize(_HEAD)
 _CRC_BYTES = 4
@@ -62,9 +64,9 @@ class ProgramError(ValueError):
     """The record is damaged or of an unknown kind; or the program is too large."""
 
 
-def needed_bytes(source_bytes: int) -> int:
+def needed_bytes(source_bytes: int, homes: bool = False) -> int:
     """Heap that a program with a source of this size needs."""
-    return HEAP_BYTES + HEAP_PER_BYTE * source_bytes
+    return HEAP_BYTES + HEAP_PER_BYTE * source_bytes + HOMING_BYTES * homes
 
 
 def pack(

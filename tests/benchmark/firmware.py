@@ -47,7 +47,8 @@ DIFFERS = {
     "clock": "none is set up; QEMU counts instructions",
     "RTC": "none",
     "REPL": "on UART 2, as there is no USB",
-    "heap": f"smaller by the word at {CUT_AT:#x}; larger if that is below 0, by what the benchmark itself takes",
+    "heap": f"smaller by the word at {CUT_AT:#x}; larger if that is below 0, by what the benchmark itself takes,"
+    " at the cost of the stack",
     "memory": "64 KB more: the last 4 are the backup SRAM, which QEMU lacks; vectors and a store before them",
     "flash": "it cannot be written; the store is a file of the host, or in that memory",
     "timers, DMA, pins": "registers that mostly do nothing; where a motion runs, loop_board.c and firmware_loop.py",

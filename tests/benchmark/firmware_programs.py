@@ -131,8 +131,18 @@ CASES = {
         ("MemoryError",),
     ),
     "homes": Case("cell.home()\n", "program_failed", 2, ("the switch of joint 1 stays pressed",)),
-    "recurses": Case("def f(n):\n    return f(n + 1) + 1\n\nf(0)\n", "program_failed", 3, ("RuntimeError",)),
 }
+RECURSES = {
+    "fills": CASES["fills"],
+    "recurses": Case("def f(n):\n    return f(n + 1) + 1\n\nf(0)\n", "program_failed", 3, ("RuntimeError",)),
+    "recurses_in_cell": Case(
+        "def f(n):\n    cell.moving()\n    return f(n + 1) + 1\n\nf(0)\n",
+        "program_failed",
+        0,
+        ("RuntimeError",),
+    ),
+}
+"""In the stack as it is on the chip, which elsewhere has lost what the heap has more; the heap is smaller then."""
 
 
 def run_case(board: Board, name: str, case: Case, folder: Path) -> str:
@@ -262,7 +272,15 @@ def main(micropython: Path, folder: Path) -> None:
             free = board.client.hello().free_heap
             ended = run_case(board, case, program, Path(name))
             print(f"{case}: {free} bytes free before; {ended}", flush=True)
-        print(f"afterwards {board.client.hello().free_heap} bytes are free")
+        print(f"afterwards {board.client.hello().free_heap} bytes are free", flush=True)
+    with (
+        firmware_run.running(elf, image, more_heap=0) as (port, _),
+        tempfile.TemporaryDirectory() as name,
+        connect(port) as board,
+    ):
+        board.home(ARM)
+        for case, program in RECURSES.items():
+            print(f"{case}: {run_case(board, case, program, Path(name))}", flush=True)
 
 
 if __name__ == "__main__":

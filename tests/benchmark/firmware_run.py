@@ -150,14 +150,17 @@ def flash(folder: Path, elf: Path, with_library: bool, edges: bool = True) -> Pa
 
 
 @contextmanager
-def running(elf: Path, image: Path) -> Iterator[tuple[str, list[str]]]:
-    """A board that runs: its port for the host, and the lines that it has printed until now."""
+def running(elf: Path, image: Path, more_heap: int = OWN) -> Iterator[tuple[str, list[str]]]:
+    """A board that runs: its port for the host, and the lines that it has printed until now.
+
+    ``more_heap``: bytes beyond the chip's heap, for what stands in for hardware; they are the end of the stack.
+    """
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         number = probe.getsockname()[1]
     serial = f"tcp:127.0.0.1:{number},server=on,wait=off,nodelay=on"
     with tempfile.NamedTemporaryFile() as cut:
-        cut.write(struct.pack("<i", -OWN))
+        cut.write(struct.pack("<i", -more_heap))
         cut.flush()
         command = firmware.emulator(elf, image, Path(cut.name), "-icount", f"shift={loop_board._SHIFT}")
         command += ["-serial", serial]

@@ -6,13 +6,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from armtempo.cli.jog_screen import JogScreen
+from armtempo.encoding import encoded_motion
 from armtempo.model.arm import Arm
+from armtempo.planning import point_to_point
 from armtempo.robot.board import Board
 from armtempo_shared import wire
 
-from tests.host.made_runs import shipped_plan
 from tests.host.test_jog_keys import Typed
 from tests.inprocess import Pipe, connect
 
@@ -66,7 +68,8 @@ def modules(calls: list[str]) -> list[str]:
 
 def test_a_start_goes_from_board_to_client_to_session(made: tuple[Board, Listening], tmp_path: Path) -> None:
     board, pipe = made
-    board.run(shipped_plan(), out=tmp_path / "runs")
+    move = point_to_point.straight("move", ARM.home_deg, np.array(ARM.home_deg) + 1.0, ARM)
+    board.run(encoded_motion.of_trajectory(move, ARM), out=tmp_path / "runs")
     (calls,) = pipe.starts
     assert modules(calls) == ["robot.motions", "link.client", "link.session"]
 

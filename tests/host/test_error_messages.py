@@ -111,9 +111,10 @@ def test_every_usage_error_has_a_next_step(name: str) -> None:
     assert "No such option" in result.output
 
 
-def test_usage_errors_of_the_group_name_the_help_page() -> None:
-    result = armtempo("no-such-command")
+def test_a_misspelt_command_names_the_nearest_and_the_help_page() -> None:
+    result = armtempo("stauts")
     assert result.exit_code == 2
+    assert "did you mean 'status'" in result.stderr
     assert re.search(r"Try 'armtempo (--help|-h)' for help\.", result.output)
 
 

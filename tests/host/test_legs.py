@@ -17,6 +17,7 @@ from armtempo.cli import main
 from armtempo.encoding import encoded_sequence
 from armtempo.report import verdict
 from armtempo.report.evaluation import evaluate
+from armtempo.report.run_folder import ARM
 from armtempo.report.verdict import BAD, GOOD, OPEN
 from armtempo.robot import goto
 from click.testing import CliRunner
@@ -201,8 +202,15 @@ def test_a_damaged_folder_is_read_or_refused_in_words(
 # version 1: a motion had its record in motion.bin, a sequence its samples in samples.csv
 
 
+def of_version_1(name: str, folder: Path) -> armtempo.Run:
+    """A run of the paper's arm, which both of them have in their folders."""
+    path = shutil.copytree(VERSION_1 / name, folder / name)
+    shutil.copy(VERSION_1 / ARM, path)
+    return armtempo.Run.load(path)
+
+
 def test_a_motion_of_version_1_is_read(tmp_path: Path) -> None:
-    run = armtempo.Run.load(VERSION_1 / "small-001")
+    run = of_version_1("small-001", tmp_path)
     assert (run.name, run.complete, len(run.repetitions)) == ("small", True, 2)
     assert run.plan is None
     assert run.trajectory.duration_s == pytest.approx(1.0627, abs=1e-4)
@@ -211,8 +219,8 @@ def test_a_motion_of_version_1_is_read(tmp_path: Path) -> None:
     assert (GOOD, "the board made every step pulse of the motion") in findings(run.path)
 
 
-def test_a_sequence_of_version_1_is_read() -> None:
-    run = armtempo.Run.load(VERSION_1 / "pick-001")
+def test_a_sequence_of_version_1_is_read(tmp_path: Path) -> None:
+    run = of_version_1("pick-001", tmp_path)
     assert (run.name, run.state, run.complete, run.rows_lost) == ("pick", "finished", True, 0)
     assert run.entries[0].ended == {"step": 1, "cycle": 2, "counters": {"parts": 2}}
     assert {run.leg_of(row) for row in run.samples.row} == {1, 2}

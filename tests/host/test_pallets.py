@@ -182,6 +182,10 @@ def test_the_tool_comes_to_each_place_from_above(tmp_path: Path, quick: None) ->
     lines = sequences.lines(plan)
     assert any(line.startswith("cycle (step 1, 12 times): ") for line in lines)
     assert f"on the board: 36 motions, {flash_use.of_plan(plan)} bytes of flash" in lines
+    many = replace(plan, legs=3 * plan.legs)
+    assert flash_use.of_plan(many) > flash_use.EMPTY_BYTES
+    (line,) = [each for each in sequences.lines(many) if each.startswith("on the board: 108 motions, ")]
+    assert f"more than the {flash_use.EMPTY_BYTES} of a new board: an upload is refused" in line
 
 
 def test_a_part_of_it_and_from_its_end(tmp_path: Path, quick: None) -> None:

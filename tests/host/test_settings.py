@@ -132,9 +132,3 @@ def test_a_job_without_an_arm_is_not_planned() -> None:
     assert done.exit_code == 2
     assert "no arm is set" in done.stderr
     assert not list(Path().glob("*.json"))
-
-
-def test_a_misspelt_command_names_the_nearest() -> None:
-    done = run("stauts")
-    assert done.exit_code == 2
-    assert "did you mean 'status'" in done.stderr

@@ -11,7 +11,7 @@ from armtempo.basics.errors import InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
 from armtempo.model.frame import ArmFrame
-from armtempo.planning.jog import jog_motion
+from armtempo.planning.jog import jog_line, jog_motion
 from armtempo.planning.jog.jog_line import FollowedLine
 from armtempo.planning.jog.jog_motion import JogMove
 from armtempo.splines.trajectory import Trajectory
@@ -87,7 +87,7 @@ def test_a_fast_jog_stays_on_its_line_where_its_ramps_take_all_of_it() -> None:
     check_limits(motion, PAPER, 1.0)
     start = forward(PAPER, here)[:3, 3]
     tool = forward(PAPER, motion.trajectory(np.linspace(0.0, motion.trajectory.duration_s, 800)))[:, :3, 3]
-    assert np.linalg.norm((tool - start)[:, 1:], axis=1).max() < 1.1 * jog_motion.STRAY_MM
+    assert np.linalg.norm((tool - start)[:, 1:], axis=1).max() < 1.1 * jog_line.STRAY_MM
     assert start[0] - tool[-1, 0] > 700.0
 
 

@@ -14,7 +14,7 @@ from armtempo.basics.errors import InputError
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.diagnosis.finding import Level
 from armtempo.encoding import decode, encode
-from armtempo.model import arm_json, drive_limits, shipped, taught
+from armtempo.model import arm_json, drive_limits, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Driver, Dynamics, Encoder, LimitSwitches
@@ -339,14 +339,6 @@ def test_another_coupling_is_another_arm_for_the_board() -> None:
         for arm in (THOR, other, replace(THOR, coupling=()))
     ]
     assert len(set(heads)) == 3
-
-
-def test_a_taught_posture_with_few_digits_has_the_same_steps() -> None:
-    rng = np.random.default_rng(SEED)
-    for angles in rng.uniform(-80.0, 80.0, (20, 6)):
-        found = taught.digits(THOR, angles.tolist())
-        assert THOR.transmission.whole_steps(found) == THOR.transmission.whole_steps(angles)
-        assert all(len(f"{value:.12g}") <= 8 for value in found)
 
 
 def test_rows_of_the_file_are_those_of_motors() -> None:

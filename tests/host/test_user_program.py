@@ -153,8 +153,8 @@ def test_what_moves_by_itself_has_switches_and_an_estop(
     safety: str, switches: int, problem: str, tmp_path: Path
 ) -> None:
     before, *joints = shipped.arm_path().read_text().split("[[joint]]")
-    for number in range(switches):
-        joints[number] += f"\n[joint.switches]\nlow = {number + 1}\nlow_deg = 0\n"
+    for number, joint in enumerate(Arm.paper().driven[:switches]):
+        joints[number] += f"\n[joint.switches]\nlow = {number + 1}\nlow_deg = {joint.range_deg[0]}\n"
     table = f'[safety]\nat_power_up = "program"\n{safety}\n'
     before = re.sub(r"^\[safety\]\n(?:[^\[]*)", "", before, flags=re.MULTILINE) + table
     (tmp_path / "arm.toml").write_text("[[joint]]".join((before, *joints)))
@@ -277,7 +277,9 @@ def test_check_needs_no_board(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["pick_place.py", "pallet.py", "polling.py", "alone.py"])
 def test_the_pages_examples_fit_on_the_chip(name: str, tmp_path: Path) -> None:
     found = UserProgram.load(example(name, tmp_path), with_switches(1, 2, 3))
-    assert needed_bytes(len(found.marked.encode())) <= CHIP_BYTES
+    heap = encoded_program.EncodedProgram(found, ARM, (), b"").heap_bytes
+    assert needed_bytes(len(found.marked.encode())) <= heap <= CHIP_BYTES
+    assert (heap > needed_bytes(len(found.marked.encode()))) == bool(found.homes)
 
 
 class Small:

@@ -117,7 +117,6 @@ def test_without_a_fault_it_ends_where_it_was_to() -> None:
     [
         (InjectedFault("stall", at_s=0.4, ms=10), "", None),
         (InjectedFault("stall", at_s=0.3, ms=1500), "underrun", None),
-        (InjectedFault("stall", at_s=0.8, ms=1500), "underrun", None),
         (InjectedFault("block", at_s=0.3, joint=1), "following", 1),
         (InjectedFault("slip", at_s=0.5, joint=2, counts=-60), "following", 2),
         (InjectedFault("crash", at_s=0.5), "internal", None),
@@ -170,10 +169,10 @@ def test_the_motor_crosses_the_backlash(compensated_deg: float, lost_deg: float)
     assert moved_deg == pytest.approx(0.0 if lost_deg else 0.2, abs=near_deg)
 
 
-@pytest.mark.parametrize("at_s", [0.0, 0.41, 0.77])
-def test_estop_freezes_within_20_us(at_s: float, tmp_path: Path) -> None:
+def test_estop_freezes_within_20_us(tmp_path: Path) -> None:
+    """At any moment: ``case_estop_anywhere`` of engine_faults.py."""
     log = tmp_path / "edges"
-    end, _ = run(InjectedFault("input", at_s=at_s, name="E15", level=0), arm=GUARDED, log=log)
+    end, _ = run(InjectedFault("input", at_s=0.41, name="E15", level=0), arm=GUARDED, log=log)
     assert code(end) == "estop"
     pins = edgelog.read(log)[-1].motion()
     (tripped,) = pins["E15"][0]

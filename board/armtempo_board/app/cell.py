@@ -84,6 +84,7 @@ _LONGEST_S = 3600.0
 _LEAST_PERCENT = 1
 _PERCENT = 100
 _NOTHING = "nothing"
+_NO_POSTURES = (set, dict, bytes)  # as they have no order, or no angles
 _NAMED = ("pallets", "tools")  # the host sends those that it finds in the text
 
 
@@ -294,9 +295,9 @@ class Cell:
             return found
         per_deg = self._table["per_deg"]
         try:
-            if len(posture) == len(per_deg):
+            if not isinstance(posture, _NO_POSTURES) and len(posture) == len(per_deg):
                 return [_rounded(angle * scale) for angle, scale in zip(posture, per_deg)]
-            given = str(len(posture))
+            given = repr(posture) if isinstance(posture, _NO_POSTURES) else str(len(posture))
         except (TypeError, ValueError, OverflowError):
             given = repr(posture)
         raise CellError("a posture has %d angles, not %s" % (len(per_deg), given))

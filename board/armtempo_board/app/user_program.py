@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 _PERCENT = const(100)
 _MOST_SKIPPED = const(16)
 _SAY_MS = const(500)  # longest wait until a host has taken the text before,
-_LONGEST_ROW = const(120)
 _ALONE_MS = const(20)  # and if none was heard so long
+_LONGEST_ROW = const(120)  # of a traceback,
+_MOST_ROWS = const(8)  # of which the host is told the end
 
 
 class UserProgram(Sequencer):
@@ -338,17 +339,20 @@ def _cell_error(what: str, refused: Refused) -> CellError:
 
 
 def _traceback(error: "BaseException", file: str) -> "tuple[str, int]":
-    """The lines of a traceback that are in the program's file, and the error; the last line's number, or 0."""
+    """The last lines of a traceback that are in the program's file, and the error; the last line's number, or 0."""
     text = io.StringIO()
     sys.print_exception(error, text)
+    text.seek(0)
     place = '  File "%s", line ' % file
     found = []
     line = 0
-    for row in text.getvalue().split("\n"):
+    for row in text:  # after endless recursion they are many, and memory is short
+        row = row.rstrip("\n")
         if row.startswith(place):
-            number = row[len(place) :].split(",")[0]
-            line = int(number)
+            line = int(row[len(place) :].split(",")[0])
         elif row.startswith((" ", "Traceback")) or not row:
             continue
         found.append(row[:_LONGEST_ROW])  # what the host is told is cut at its begin
+        if len(found) > _MOST_ROWS:
+            found.pop(0)
     return "\n".join(found), line

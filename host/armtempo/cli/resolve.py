@@ -135,6 +135,11 @@ def describe_source(name: str, source: str) -> str:
     return f"{name} ({where})" if where else name
 
 
+def remark_other_arm(arm: Arm) -> None:
+    """Say that the board is set up for another arm than this one, which is set."""
+    remark(f"the board is set up for a different arm than {describe_arm(arm)}; see 'armtempo configure'")
+
+
 # plans
 
 

@@ -109,7 +109,7 @@ def lines(planned: SequencePlan) -> list[str]:
         found.append(f"in all: {_made_of(planned.total)}")
     found.extend(f"note: {note}" for note in planned.notes)
     found.extend(text_summary.torque_lines(planned.loaded_legs))
-    found.append(f"on the board: {len(planned.legs)} motions, {flash_use.of_plan(planned)} bytes of flash")
+    found.append(f"on the board: {len(planned.legs)} motions, {flash_use.words(planned)}")
     found.append(f"pause between two motions: about {PAUSE_S:g} s; waits for inputs are not counted")
     return found
 

@@ -46,9 +46,7 @@ def _named(found: BoardState, arm_path: Path | None) -> BoardState:
     except InputError as error:  # show the board's state nevertheless
         results.remark(f"armtempo: {error}")
     if named is not None and found.arm_crc and not found.arm and not found.named(named).arm:
-        results.remark(
-            f"the board is set up for a different arm than {resolve.describe_arm(named)}; see 'armtempo configure'"
-        )
+        resolve.remark_other_arm(named)
     return found.named(named).named(Arm.paper())
 
 
@@ -74,7 +72,7 @@ def _wear(state: BoardState) -> list[str]:
     if not state.erasures:
         return []
     counts = ", ".join(f"{sector}: {count}" for sector, count in sorted(state.erasures.items()))
-    return [f"wear      erasures by sector of the flash: {counts}; a chip's is good for 10 000"]
+    return [f"wear      erasures by sector of the flash: {counts}; a chip's is good for 10000"]
 
 
 def _measured(state: BoardState) -> str:

@@ -96,9 +96,7 @@ def _arm_of(board: Board, arm_path: Path | None) -> Arm | None:
     """The arm that the board is set up for; None if it is not known."""
     named = resolve.named_arm(arm_path)
     if named is not None and record_crc(named) != board.info.arm_crc:
-        results.remark(
-            f"the board is set up for a different arm than {resolve.describe_arm(named)}; see 'armtempo configure'"
-        )
+        resolve.remark_other_arm(named)
         named = None
     try:
         return resolve.arm_of_board(board, named)

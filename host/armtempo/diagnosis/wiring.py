@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from armtempo.diagnosis.finding import Finding, error, note, warning
-from armtempo.model import channels
+from armtempo.model import channels, home_switches
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Joint
 from armtempo.model.pin_use import problems as pin_problems
@@ -19,8 +19,11 @@ def findings(arm: Arm) -> list[Finding]:
     found = _channels(arm)
     found += _levels(arm)
     found += [error(problem.where, problem.what, problem.next_step) for problem in pin_problems(arm)]
+    found += [error(each.joint, each.what, each.next_step) for each in home_switches.problems(arm)]
     found += [finding for joint in arm.driven for finding in _switches(joint)]
     found += [_unused(joint) for joint in arm.joints if joint.motor is None and _has_switch(joint)]
+    homed = [name for group in home_switches.order(arm) for name in group]
+    found += [_not_homed(name) for group in arm.homing for name in group if name not in homed]
     if any(joint.motor and joint.motor.channel == BUTTON_CHANNEL for joint in arm.joints):
         text = "channel 6 takes the pin of the board's button, which starts nothing then"
         found.append(note("wiring", text, "use channels 1 to 5 if the button is to start motions"))
@@ -57,17 +60,6 @@ def _levels(arm: Arm) -> list[Finding]:
 def _switches(joint: DrivenJoint) -> list[Finding]:
     switches, (low, high) = joint.switches, joint.range_deg
     found = []
-    if (
-        switches.low_deg is not None
-        and switches.high_deg is not None
-        and switches.low_deg >= switches.high_deg
-    ):
-        text = (
-            f"its low switch trips at {switches.low_deg:g} {joint.unit.name}, not below its high one at "
-            f"{switches.high_deg:g}"
-        )
-        keys = f"{joint.unit.key('low_deg')} and {joint.unit.key('high_deg')}"
-        found.append(error(joint.name, text, f"correct {keys} in its [switches]"))
     for side, number, trip_deg in (
         ("low", switches.low, switches.low_deg),
         ("high", switches.high, switches.high_deg),
@@ -105,3 +97,10 @@ def _has_switch(joint: Joint) -> bool:
 def _unused(joint: Joint) -> Finding:
     text = "has switches but no motor: they are not checked"
     return warning(joint.name, text, "give it a motor, or leave its [switches] out")
+
+
+def _not_homed(joint: str) -> Finding:
+    text = (
+        "is in 'homing', but has no motor, or no switch whose position is known: it is not homed by switches"
+    )
+    return warning(joint, text, "give it one, or take it out of homing")

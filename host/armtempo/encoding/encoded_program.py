@@ -57,7 +57,7 @@ class EncodedProgram:
     @property
     def heap_bytes(self) -> int:
         """Heap that it needs on the board."""
-        return program.needed_bytes(len(self.program.marked.encode()))
+        return program.needed_bytes(len(self.program.marked.encode()), bool(self.program.homes))
 
 
 def motions_beside(found: UserProgram, arm: Arm) -> tuple[EncodedMotion, ...]:

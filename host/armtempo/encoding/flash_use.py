@@ -10,6 +10,8 @@ from armtempo.splines.trajectory import Trajectory
 
 BLOCK = 512
 """Of the flash; a file takes whole ones."""
+EMPTY_BYTES = 180 * BLOCK
+"""Free on a new STM32F4DISC: MicroPython's files take 10 of 190 blocks (host/docs/virtual-board.md)."""
 _SUFFIX = ".atm"
 _ENTRY_BYTES, _LETTERS = 32, 13
 """A file has an entry in its folder, and one for each so many letters of its name."""
@@ -32,6 +34,13 @@ def of_plan(plan: SequencePlan) -> int:
     record = made_with.added(sequence.pack(0, rows_of(plan), keys, plan.counters), made_with.of_plan(plan))
     sizes = [*map(of_trajectory, plan.legs), len(record)]
     return sum(map(in_blocks, sizes)) + of_names([plan.name, *(name for name, _ in keys)])
+
+
+def words(plan: SequencePlan) -> str:
+    """Bytes that a sequence and its motions take, and whether they are more than a new board has."""
+    needed = of_plan(plan)
+    more = f", more than the {EMPTY_BYTES} of a new board: an upload is refused; plan a part of the pallet"
+    return f"{needed} bytes of flash" + more * (needed > EMPTY_BYTES)
 
 
 def of_trajectory(trajectory: Trajectory) -> int:

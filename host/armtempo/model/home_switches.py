@@ -5,6 +5,7 @@ The host drives homing by them (``robot/homing.py``), or the board alone, for a 
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -96,6 +97,86 @@ def order(arm: HomedArm) -> list[tuple[str, ...]]:
     return [tuple(arm.driven[index].name for index in group) for group in groups(arm)]
 
 
+@dataclass(frozen=True)
+class SwitchProblem:
+    """Why a joint cannot be homed as the arm file has its switches."""
+
+    joint: str
+    what: str
+    next_step: str
+
+
+def problems(arm: HomedArm) -> list[SwitchProblem]:
+    """Switches that contradict each other, the range or the home position, or that the board cannot tell apart."""
+    found = [problem for joint in arm.driven for problem in _of_one(joint)]
+    for group in groups(arm):
+        users: dict[int | str | None, str] = {}
+        for index, switch in group.items():
+            joint = arm.driven[index]
+            pin = joint.switches.low if switch.side < 0 else joint.switches.high
+            if pin in users:
+                what = (
+                    f"its switch is on input {pin}, as that of {users[pin]}, with which it is homed together"
+                )
+                found.append(
+                    SwitchProblem(joint.name, what, "home them one after the other, or wire each to its own")
+                )
+            users[pin] = joint.name
+    return found
+
+
+def sharing(arm: HomedArm, joints: Collection[int]) -> list[str]:
+    """The names of other joints with a switch on an input of these joints (from 0, among the driven ones)."""
+    pins = {pin for index in joints for pin in _pins(arm.driven[index])}
+    others = (joint for index, joint in enumerate(arm.driven) if index not in joints)
+    return [joint.name for joint in others if pins & _pins(joint)]
+
+
+def _pins(joint: DrivenJoint) -> set[int | str]:
+    return {pin for pin in (joint.switches.low, joint.switches.high) if pin is not None}
+
+
+def check(arm: HomedArm, joints: Iterable[int]) -> None:
+    """Raise InputError for the first of the ``problems`` of these joints (from 0, among the driven ones)."""
+    names = [arm.driven[index].name for index in joints]
+    for problem in problems(arm):
+        if problem.joint in names:
+            raise InputError(f"arm {arm.name!r}: {problem.joint}: {problem.what}", problem.next_step)
+
+
+def _of_one(joint: DrivenJoint) -> list[SwitchProblem]:
+    """The problems of one joint's switches."""
+    switches, unit, (low, high) = joint.switches, joint.unit, joint.range_deg
+    found = []
+    if switches.low is not None and switches.low == switches.high:
+        what = f"both its switches are on input {switches.low}, so that it could not leave the one at which it stands"
+        found.append(SwitchProblem(joint.name, what, "wire each to an input of its own"))
+    ends = (switches.low_deg, switches.high_deg)
+    if ends[0] is not None and ends[1] is not None and ends[0] >= ends[1]:
+        what = f"its low switch trips at {ends[0]:g} {unit.name}, not below its high one at {ends[1]:g}"
+        keys = f"{unit.key('low_deg')} and {unit.key('high_deg')}"
+        return [*found, SwitchProblem(joint.name, what, f"correct {keys} in its [switches]")]
+    for side, pin, sign, trip_deg in (
+        ("low", switches.low, -1, ends[0]),
+        ("high", switches.high, 1, ends[1]),
+    ):
+        if pin is None or trip_deg is None:
+            continue
+        trips = f"its {side} switch trips at {trip_deg:g} {unit.name}"
+        of_range = f"its range, {low:g} to {high:g}"
+        key = unit.key(f"{side}_deg")
+        edge, far = (low, high) if sign < 0 else (high, low)
+        if sign * (trip_deg - far) <= 0.0:
+            found.append(SwitchProblem(joint.name, f"{trips}, in all of {of_range}", f"correct {key}"))
+        elif sign * (trip_deg - edge) > high - low:
+            what = f"{trips}, farther away than all of {of_range}"
+            found.append(SwitchProblem(joint.name, what, f"correct {key}"))
+        elif sign * (joint.home_deg - trip_deg) > TOLERANCE_DEG:
+            what = f"{trips}, but its home is at {joint.home_deg:g}, beyond it"
+            found.append(SwitchProblem(joint.name, what, f"correct {key}, or {unit.key('home_deg')}"))
+    return found
+
+
 def check_board_can_home(arm: HomedArm) -> None:
     """Raise InputError if the board cannot home all joints of an arm by itself."""
     if arm.coupling:
@@ -112,6 +193,7 @@ def check_board_can_home(arm: HomedArm) -> None:
             "itself",
             f"give each of them {low} or {high} in its [switches], or home from the host",
         )
+    check(arm, fitted)
 
 
 def _of_joint(joint: DrivenJoint) -> HomeSwitch | None:

@@ -49,15 +49,19 @@ class Tool:
     def at(self, angles_deg: Array) -> ToolState:
         """The state for angles (P, J) of the moving joints."""
         chained = self._frames(angles_deg)
-        *rotation, position = (np.stack(part, axis=-1) for part in chained[-1])
+        position, rotation = _pose(chained[-1])
         axes, slopes = self._by_row(chained, position)
         by_joint = "rpi,rj->pij"
         return ToolState(
             position,
-            np.stack(rotation, axis=-1),
+            rotation,
             np.einsum(by_joint, slopes, self.turns),
             np.einsum(by_joint, axes, self.turns),
         )
+
+    def poses(self, angles_deg: Array) -> tuple[Array, Array]:
+        """Position, (P, 3), and axes in columns, (P, 3, 3), alone, for angles (P, J)."""
+        return _pose(self._frames(angles_deg)[-1])
 
     def _by_row(self, chained: list[Frame[Array]], position: Array) -> tuple[Array, Array]:
         """Axis of each moving row, per degree, and the derivative of the tool's position by it: each (R, P, 3)."""
@@ -119,6 +123,12 @@ class Tool:
             reach[row] = SLIDE_MM
             reach[:row] = np.maximum(reach[:row], SLIDE_MM)
         return np.asarray(reach[self._rows])
+
+
+def _pose(frame: Frame[Array]) -> tuple[Array, Array]:
+    """Position, (P, 3), and axes in columns, (P, 3, 3)."""
+    *axes, position = (np.stack(part, axis=-1) for part in frame)
+    return position, np.stack(axes, axis=-1)
 
 
 def _cross(first: Array, second: Array) -> Array:

@@ -47,8 +47,8 @@ def home_to_switches(
     """Home every joint that has a switch of known angle, in the order of ``arm.homing``; the others do not move.
 
     ``joint``: only this one, from 0, and those that are coupled with it. Ends at the home posture. Raises InputError
-    if no joint has such a switch, LinkError if a switch does not trip, BoardError if the board refuses or a fault
-    ends it, Stopped after a stop request.
+    if no joint has such a switch, or as ``home_switches.check``; LinkError if a switch does not trip, BoardError if
+    the board refuses or a fault ends it, Stopped after a stop request.
     """
     wanted = range(len(arm.driven)) if joint is None else arm.transmission.group(joint)
     groups = [
@@ -64,6 +64,7 @@ def home_to_switches(
             if arm.slides
             else "give low_deg or high_deg in a joint's [switches], or home by hand",
         )
+    home_switches.check(arm, [index for group in groups for index in group])
     told = _Told(progress, sum(map(len, groups)))
     found_deg: dict[int, float] = {}
     for group in groups:
@@ -140,7 +141,8 @@ class _GroupHoming(Homing):
         if kind == MISSED:
             return LinkError(
                 f"{names}: no limit switch tripped within {length:.0f} {unit}, its range and a margin",
-                "check its wiring, its pin and its level ('active') in the arm file, and where the joint stands",
+                "check its wiring, its pin, its level ('active') and at which end it is in the arm file, its motor's "
+                "direction, and where the joint stands",
             )
         if kind == HELD:
             return LinkError(
@@ -153,10 +155,13 @@ class _GroupHoming(Homing):
                 "check its wiring and that it sits firmly",
             )
         levels = ", ".join(f'active = "{self._arm.driven[index].switches.active}"' for index in joints)
+        others = ", ".join(home_switches.sharing(self._arm, joints))
+        shared = f"; or {others}, whose switch is on the same input, stands on it" if others else ""
         return LinkError(
             f"{names}: its limit switch is still pressed {home_switches.MOST_PRESSED_DEG:g} {unit} away from where it "
             "tripped",
-            f"its level is probably inverted: the arm file has {levels}; or it is stuck, or wired to another pin",
+            f"its level is probably inverted: the arm file has {levels}; or it is stuck, or wired to another "
+            f"pin{shared}",
         )
 
     def stands(self, joint: int) -> float:

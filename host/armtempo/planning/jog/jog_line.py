@@ -20,6 +20,7 @@ from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.frame import TOOL
 from armtempo.model.joint_unit import SLIDE_MM
+from armtempo.model.parts import DrivenJoint
 from armtempo.model.tool_pose import APPROACH, BASE, PITCH, ROLL, WHOLE, YAW, Pose
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line.deviation import LineDeviation, proven
@@ -205,14 +206,22 @@ class ToolLine:
         """Of each joint: how far it moves the tool for a radian of the kinematics, at most, by the reach: (joints,)."""
         return np.array([SLIDE_MM / self.reach_mm if joint.slides else 1.0 for joint in self.arm.joints])
 
-    def _outside(self, angles: Array) -> str:
-        """Say which joint is within the margin of its travel's end, and nearer than at the start; "" if none is."""
+    @cached_property
+    def _bounds_deg(self) -> list[tuple[int, DrivenJoint, float, float]]:
+        """Of each driven joint: its index among all, and how far it may go, which is as far as it is at least."""
+        found = []
         for index, joint in zip(self.arm.driven_indices, self.arm.driven, strict=True):
             margin = MARGIN_STEPS / joint.steps_per_deg
-            angle, start = math.degrees(angles[index]), math.degrees(self._start[index])
-            least, most = joint.travel_deg
-            low, high = (min(least + margin, start), max(most - margin, start))
-            if not low - 1e-9 <= angle <= high + 1e-9:
+            start, (least, most) = math.degrees(self._start[index]), joint.travel_deg
+            low, high = min(least + margin, start), max(most - margin, start)
+            found.append((index, joint, low - 1e-9, high + 1e-9))
+        return found
+
+    def _outside(self, angles: Array) -> str:
+        """Say which joint is within the margin of its travel's end, and nearer than at the start; "" if none is."""
+        for index, joint, low, high in self._bounds_deg:
+            angle = math.degrees(angles[index])
+            if not low <= angle <= high:
                 return f"{joint.name} is at {joint.end_of_travel('low' if angle < low else 'high')}"
         return ""
 
@@ -268,8 +277,9 @@ class FollowedLine:
             found.append(np.degrees(angles[list(line.arm.driven_indices)]))
         return np.array(found)
 
-    def stray(self, angle_points_deg: Array, distance_points: Array) -> LineDeviation:
-        """Bound of the tool's deviation for splines of the driven joints, (S + 5, J), and of the distance, (S + 5,)."""
+    def is_kept(self, angle_points_deg: Array, distance_points: Array) -> bool:
+        """Whether it is proven that the tool keeps to it, for splines of the driven joints, (S + 5, J), and of the
+        distance, (S + 5,)."""
         line = self.line
         fixed = line.fixed if line.fixed in (WHOLE, (APPROACH,)) else ()
         turn = math.radians(1.0) * line.direction if line.about else np.zeros(3)
@@ -280,7 +290,9 @@ class FollowedLine:
             of_path(angle_points_deg, DEGREE),
             of_path(distance_points[:, None], DEGREE)[:, :, 0],
         )
-        return proven(angles, distances, tool, ToolPath((piece,)), fixed, LineDeviation(STRAY_MM, STRAY_DEG))
+        most = LineDeviation(STRAY_MM, STRAY_DEG)
+        found = proven(angles, distances, tool, ToolPath((piece,)), fixed, most, whether=True)
+        return found.position_mm <= STRAY_MM and found.rotation_deg <= STRAY_DEG
 
 
 def _short(reason: str) -> str:

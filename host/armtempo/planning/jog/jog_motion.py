@@ -17,7 +17,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint
 from armtempo.planning import brake_time, move_law, point_to_point, workspace_check
 from armtempo.planning.brake_time import BrakeTimes
-from armtempo.planning.jog.jog_line import STRAY_DEG, STRAY_MM, FollowedLine, ToolLine, direction_of
+from armtempo.planning.jog.jog_line import FollowedLine, ToolLine, direction_of
 from armtempo.planning.move_law import DEGREE, MoveLimits
 from armtempo.splines import bspline, extremes
 from armtempo.splines.trajectory import Trajectory
@@ -258,8 +258,7 @@ def _on_line(name: str, followed: FollowedLine, length: float, speed: float) -> 
         trajectory = law.trajectory(name, list(points.T))
         if not _within(trajectory, arm):
             return None
-        stray = followed.stray(points, begin + law.distance)
-        if stray.position_mm <= STRAY_MM and stray.rotation_deg <= STRAY_DEG:
+        if followed.is_kept(points, begin + law.distance):
             return _slowed(trajectory, arm, speed)
     return None
 

@@ -44,16 +44,21 @@ def proven(
     path: ToolPath,
     fixed: tuple[str, ...],
     enough: LineDeviation,
+    whether: bool = False,
 ) -> LineDeviation:
     """Bounds on the deviation of a spline from its path.
 
     ``angles_deg``: Bernstein coefficients (S, 6, J), ``distances``: (S, 6). Found to 2 %, or to that part of
-    ``enough``.
+    ``enough``; with ``whether`` only until it is known whether that is more than ``enough``.
     """
     bounds = path.bounds
     floor = np.array([enough.position_mm, _chord(enough.rotation_deg)]) * _SHARP
     counts = np.array([1.0, 1.0 if fixed else 0.0])
     outside = max(0.0, -float(distances.min()), float(distances.max()) - path.length)
+    beyond_deg = float(np.degrees(bounds.turn)) * outside
+    limit = np.array(
+        [enough.position_mm - bounds.slope * outside, _chord(max(0.0, enough.rotation_deg - beyond_deg))]
+    )
     best = np.zeros(2)
     while True:
         alive()
@@ -61,10 +66,13 @@ def proven(
         bends = _bends(angles_deg, distances, tool, bounds)
         best = np.maximum(best, reached.max(axis=0))
         most = reached + counts * np.stack(bends, axis=1) / 8.0
-        open_ = np.any(most > best * (1.0 + _SHARP) + floor, axis=1)
-        if not open_.any() or 2 * np.count_nonzero(open_) > _MOST_PIECES:
-            found = np.maximum(best * (1.0 + _SHARP) + floor, most.max(axis=0) if open_.any() else 0.0)
-            beyond_deg = float(np.degrees(bounds.turn)) * outside
+        found = best * (1.0 + _SHARP) + floor
+        open_ = np.any(most > found, axis=1)
+        final = np.maximum(best, most.max(axis=0)) * (1.0 + _SHARP) + floor  # what may be found at most
+        is_known = whether and (np.all(final <= limit) or np.any(found > limit))
+        if is_known or not open_.any() or 2 * np.count_nonzero(open_) > _MOST_PIECES:
+            if open_.any():
+                found = final if is_known and np.all(final <= limit) else np.maximum(found, most.max(axis=0))
             turned_deg = _degrees(float(found[1])) + beyond_deg
             return LineDeviation(float(found[0]) + bounds.slope * outside, turned_deg if fixed else 0.0)
         angles_deg, distances = halved(angles_deg[open_]), halved(distances[open_, :, None])[:, :, 0]
@@ -74,11 +82,11 @@ def _at_ends(
     angles_deg: Array, distances: Array, tool: Tool, path: ToolPath, fixed: tuple[str, ...]
 ) -> Array:
     """The larger deviation of the two ends of pieces, (N, 2): position in mm, and chord of the rotation."""
-    state = tool.at(np.concatenate([angles_deg[:, 0], angles_deg[:, -1]]))
+    at_mm, axes_there = tool.poses(np.concatenate([angles_deg[:, 0], angles_deg[:, -1]]))
     position, rotation = path.poses(np.concatenate([distances[:, 0], distances[:, -1]]))
-    away = np.linalg.norm(state.position_mm - position, axis=1)
+    away = np.linalg.norm(at_mm - position, axis=1)
     axes = slice(2, 3) if fixed == (APPROACH,) else slice(0, 3)
-    turned = (state.rotation - rotation)[:, :, axes]
+    turned = (axes_there - rotation)[:, :, axes]
     found = np.stack([away, _per_axis(fixed) * np.linalg.norm(turned, axis=(1, 2))], axis=1)
     return np.asarray(np.maximum(*np.split(found, 2)))
 

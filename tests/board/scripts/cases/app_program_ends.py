@@ -37,6 +37,15 @@ def case_a_long_text_of_an_exception_hides_neither_its_name_nor_its_line():
     assert text.startswith('  File "pick.py", line 3') and "ValueError: xxx" in text, text
 
 
+def case_of_endless_recursion_the_last_lines_are_told():
+    world = World("def f(n):\n    return f(n + 1) + 1\n\nf(0)\n")
+    ending, _, line = world.run()
+    assert (ending, line) == ("fault", 3), (ending, line)
+    (text,) = world.said()
+    assert "line 3, in f" in text and "maximum recursion depth" in text, text
+    assert len(world.board.failure) < 600, len(world.board.failure)
+
+
 def case_a_text_just_before_an_exception_does_not_hide_it():
     world = World("cell.sleep(0.2)\nprint('here')\n1 // 0\n")
     assert world.run()[0] == "fault"
