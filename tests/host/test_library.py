@@ -7,6 +7,7 @@ import inspect
 import pkgutil
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,6 +23,7 @@ from armtempo.kinematics import PoseSolver
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Sample
 from armtempo.model import shipped
+from armtempo.model.parts import Driver, LimitSwitches, Safety
 from armtempo.robot import arm_state
 from armtempo.simulator import LaunchOptions, launch
 from numpy.typing import ArrayLike
@@ -249,8 +251,27 @@ def test_an_arm_and_a_sequence_are_made_in_code() -> None:
     assert [step.step for step in sequence.steps] == [1, 6]
     with pytest.raises(armtempo.InputError, match="no output 'griper'"):
         armtempo.plan_sequence(arm, armtempo.Sequence("pick", (armtempo.SetOutput("griper", 1),)))
-    with pytest.raises(armtempo.InputError, match="microsteps is 0; give 1 to 256"):
-        armtempo.Motor(channel=1, steps_per_rev=200, microsteps=0, gear_ratio=10)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: armtempo.Motor(1, steps_per_rev=200, microsteps=0, gear_ratio=10), "microsteps is 0; give 1 to 256"),
+        (lambda: Driver(dir_setup_us=2000.0), "dir_setup_us is 2000; give 0.1 to 500"),
+        (lambda: Driver(pulse_us=float("nan")), "pulse_us is nan"),
+        (lambda: Driver(enable_active="up"), "enable_active"),
+        (lambda: Safety(on_link_loss="brake"), "on_link_loss"),
+        (lambda: Safety(link_timeout_ms=5), "link_timeout_ms is 5"),
+        (lambda: LimitSwitches(low=4), "low is 4; give an input from 1 to 3, or a pin"),
+        (lambda: LimitSwitches(high=1, high_deg=float("inf")), "high_deg is inf"),
+        (lambda: LimitSwitches(low=1, active="on"), "active is 'on'; give low or high"),
+    ],
+)  # fmt: skip
+def test_parts_made_in_code_have_values_that_the_arm_file_allows(
+    make: Callable[[], object], said: str
+) -> None:
+    with pytest.raises(armtempo.InputError, match=said):
+        make()
 
 
 @pytest.mark.long

@@ -24,7 +24,8 @@ from tests.host.made_runs import shipped_plan
 from tests.host.problems import faults
 
 ARM = Arm.paper()
-MOVE = point_to_point.straight("move", (0, -60, 40), (60, -90, 10), ARM)
+START = (0.0, -60.0, 40.0)
+MOVE = point_to_point.straight("move", START, (60, -90, 10), ARM)
 TIMES = np.linspace(0.0, MOVE.duration_s, 80)
 
 
@@ -101,6 +102,39 @@ def test_speeds_that_some_points_lack_are_not_used_and_this_is_told() -> None:
     content["points"][1]["velocities"] = [0.0, 0.0, 0.0]
     found = joint_trajectory.of_text(json.dumps(content), "m.json", ARM)
     assert found.notes == ("velocities were not used, as not all points have them",)
+
+
+def test_with_accelerations_it_is_the_quintic_that_controllers_follow() -> None:
+    """Of a quintic of rest to rest, given at three times, with a joint's values in another order."""
+    times = np.array([0.0, 0.7, 2.0])
+
+    def quintic(t: np.ndarray, order: int) -> np.ndarray:
+        law = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+        return np.outer(law.deriv(order)(t / 2.0) / 2.0**order, [20.0, -15.0, 10.0]) + (
+            order == 0
+        ) * np.array(START)
+
+    content = message(times, quintic(times, 0))
+    for point, speeds, accelerations in zip(
+        content["points"], quintic(times, 1), quintic(times, 2), strict=True
+    ):
+        point["velocities"] = np.radians(speeds).tolist()
+        point["accelerations"] = np.radians(accelerations).tolist()
+    found = joint_trajectory.of_content(content, "m.json", ARM)
+    np.testing.assert_allclose(found.angles_deg, quintic(found.times_s, 0), atol=1e-6)
+    content["points"][1]["accelerations"] = [0.0]
+    with pytest.raises(InputError, match="point 1: accelerations must be 3 numbers"):
+        joint_trajectory.of_content(content, "m.json", ARM)
+    content["points"][1]["accelerations"] = []
+    assert joint_trajectory.of_content(content, "m.json", ARM).notes == (
+        "accelerations were not used, as not all points have them",
+    )
+
+
+def test_positions_in_degrees_are_suspected() -> None:
+    content = message(TIMES, np.degrees(MOVE(TIMES)))
+    with pytest.raises(InputError, match="positions up to 90 leave the joints' ranges: are they in degrees"):
+        joint_trajectory.of_content(content, "m.json", ARM)
 
 
 def test_what_is_no_json_may_be_yaml_that_cannot_be_read(monkeypatch: pytest.MonkeyPatch) -> None:

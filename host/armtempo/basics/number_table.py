@@ -124,7 +124,11 @@ def _separator(lines: list[str]) -> str:
 
 
 def _split(line: str, separator: str) -> list[str]:
-    return next(csv.reader([line], delimiter=separator), []) if separator else _BLANKS.split(line.strip())
+    return (
+        next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+        if separator
+        else _BLANKS.split(line.strip())
+    )
 
 
 def _names(line: str, separator: str, width: int, units: Collection[str]) -> list[str] | None:
@@ -139,7 +143,7 @@ def _names(line: str, separator: str, width: int, units: Collection[str]) -> lis
 
 def _cells(lines: list[str], separator: str, units: Collection[str]) -> Iterable[list[str]]:
     if separator:
-        return csv.reader(lines, delimiter=separator)
+        return csv.reader(lines, delimiter=separator, skipinitialspace=True)
     rows = [_BLANKS.split(line.strip()) for line in lines]
     width = max((len(row) for row in rows if row and all(map(is_number, row))), default=0)
     # a header's names may have single blanks in them

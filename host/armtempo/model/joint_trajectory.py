@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,8 @@ _BEFORE = "\ufeff \t\r\n"
 """What may stand before JSON."""
 _TIMES_S = {"sec": 1.0, "secs": 1.0, "nanosec": 1e-9, "nsecs": 1e-9, "nsec": 1e-9}
 """Keys of a time, and their seconds."""
+_TURN_DEG = 360.0
+"""Positions that are farther beyond a range than this may be in degrees."""
 _STEP_S = 0.01
 """Largest step of the points of a trajectory with speeds."""
 
@@ -52,8 +55,8 @@ def of_text(text: str, path: Path | str, arm: Arm) -> Recorded:
     """The JointTrajectory in a text, also within another message, for the driven joints of an arm.
 
     Joints are found by their names as in tables; others are named in the notes. Between points with speeds the motion
-    is the cubic that controllers follow, given in steps of 10 ms. Raises InputError, with the point, for what is
-    missing or not a number, and MissingPackageError for YAML without PyYAML.
+    is the cubic that controllers follow, with accelerations too the quintic, given in steps of 10 ms. Raises
+    InputError, with the point, for what is missing or not a number, and MissingPackageError for YAML without PyYAML.
     """
     return of_content(_content(text, path), path, arm)
 
@@ -99,15 +102,36 @@ def of_content(content: Mapping[str, Any], path: Path | str, arm: Arm) -> Record
                 "leave it out, or give it a motor in the arm file",
             )
     notes = (f"joints that were not used: {', '.join(header.unused)}",) if header.unused else ()
-    if all(point.get("velocities") for point in points):
-        speeds = from_si(
-            [_numbers(point, "velocities", len(names), n, path) for n, point in enumerate(points)], units
+    angles = angles[:, columns]
+    _check_radians(angles, arm, path)
+    derived = []
+    for key in ("velocities", "accelerations"):
+        given = [bool(point.get(key)) for point in points]
+        rows = [_numbers(point, key, len(names), n, path) for n, point in enumerate(points) if point.get(key)]
+        if all(given):
+            derived.append(from_si(rows, units)[:, columns])
+            continue
+        if any(given):
+            notes = (*notes, f"{key} were not used, as not all points have them")
+        break
+    if derived:
+        times, angles = _between(times, angles, derived)
+    return Recorded(times, angles, notes)
+
+
+def _check_radians(angles_deg: Array, arm: Arm, path: Path | str) -> None:
+    """Refuse positions (n, J) that leave the ranges, and would not if they were in degrees."""
+    turning = [index for index, joint in enumerate(arm.driven) if not joint.slides]
+    low, high = np.array([arm.driven[index].range_deg for index in turning]).reshape(-1, 2).T
+    given_deg = angles_deg[:, turning]
+    values = np.radians(given_deg)
+    if np.any((given_deg < low - _TURN_DEG) | (given_deg > high + _TURN_DEG)) and np.all(
+        (values >= low) & (values <= high)
+    ):
+        raise InputError(
+            f"{path}: positions up to {np.abs(values).max():.4g} leave the joints' ranges: are they in degrees?",
+            "a JointTrajectory has radians; convert them",
         )
-        times, angles = _between(times, angles[:, columns], speeds[:, columns])
-        return Recorded(times, angles, notes)
-    if any(point.get("velocities") for point in points):
-        notes = (*notes, "velocities were not used, as not all points have them")
-    return Recorded(times, angles[:, columns], notes)
 
 
 def _content(text: str, path: Path | str) -> Mapping[str, Any]:
@@ -193,18 +217,35 @@ def _numbers(point: Mapping[str, Any], key: str, count: int, number: int, path: 
     return [float(value) for value in given]
 
 
-def _between(times: Array, angles: Array, speeds: Array) -> tuple[Array, Array]:
-    """Times and angles with points between, on the cubics of positions and speeds."""
+def _between(times: Array, angles: Array, derived: Sequence[Array]) -> tuple[Array, Array]:
+    """Times and angles with points between, on the cubics of positions and speeds, or the quintics of these and
+    accelerations; each (n, J)."""
     found_s, found = [times[:1]], [angles[:1]]
     for n, step in enumerate(np.diff(times)):
-        u = np.linspace(0.0, 1.0, max(int(np.ceil(step / _STEP_S)), 1) + 1)[1:, None]
-        cubic = (
-            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * angles[n]
-            + u * (1.0 - u) ** 2 * step * speeds[n]
-            + u**2 * (3.0 - 2.0 * u) * angles[n + 1]
-            - u**2 * (1.0 - u) * step * speeds[n + 1]
-        )
-        found_s.append(times[n] + step * u[:, 0])
-        found.append(cubic)
+        u = np.linspace(0.0, 1.0, max(int(np.ceil(step / _STEP_S)), 1) + 1)[1:]
+        powers = u[:, None] ** np.arange(2 * len(derived) + 2)
+        ends = [
+            step**order * values[at] for at in (n, n + 1) for order, values in enumerate((angles, *derived))
+        ]
+        found_s.append(times[n] + step * u)
+        found.append(powers @ np.linalg.solve(_HERMITE[len(derived)], ends))
+        found[-1][-1] = angles[n + 1]
     found_s[-1][-1] = times[-1]
     return np.concatenate(found_s), np.concatenate(found)
+
+
+def _hermite(derivatives: int) -> Array:
+    """What the coefficients of a polynomial on 0 to 1 make of its ends: value and derivatives at 0, then at 1."""
+    size = 2 * derivatives + 2
+    rows = [
+        [
+            math.perm(power, order) * float(at) ** (power - order) if power >= order else 0.0
+            for power in range(size)
+        ]
+        for at in (0, 1)
+        for order in range(derivatives + 1)
+    ]
+    return np.array(rows)
+
+
+_HERMITE = {1: _hermite(1), 2: _hermite(2)}

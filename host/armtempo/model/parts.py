@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
@@ -26,6 +27,8 @@ LEAST_RATIO, MOST_RATIO = 0.1, 10_000.0
 LEAST_MM_PER_REV, MOST_MM_PER_REV = 0.01, 1000.0
 """The finest screw and the largest pulley of a sliding joint."""
 _MOST_US = 500.0
+LIMIT_INPUTS = 3
+"""The board's inputs for limit switches."""
 END_STEPS = 0.01
 """An angle beyond its range by less, from rounded radians or single precision, is the end of the range."""
 Curve = tuple[tuple[float, float], ...]
@@ -147,6 +150,21 @@ class LimitSwitches:
     low_deg: float | None = None
     """Joint angle at which the low switch trips, for homing."""
     high_deg: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raise InputError for an input or a level that the board has not, or an angle that is no number."""
+        for side, pin, trip_deg in (("low", self.low, self.low_deg), ("high", self.high, self.high_deg)):
+            if isinstance(pin, int) and not 1 <= pin <= LIMIT_INPUTS:
+                raise InputError(
+                    f"LimitSwitches: {side} is {pin}",
+                    f'give an input from 1 to {LIMIT_INPUTS}, or a pin such as "PD0"',
+                )
+            if trip_deg is not None and not math.isfinite(trip_deg):
+                raise InputError(
+                    f"LimitSwitches: {side}_deg is {trip_deg}", "give where it trips, or leave it out"
+                )
+        if self.active not in LEVELS:
+            raise InputError(f"LimitSwitches: active is {self.active!r}", f"give {' or '.join(LEVELS)}")
 
 
 @checked_fields
@@ -403,6 +421,10 @@ class Driver:
     dir_hold_us: float = field(default=5.0, metadata=key("DIR is stable after a step", 0.1, _MOST_US))
     enable_active: str = field(default="low", metadata=key("level of ENABLE with current", choices=LEVELS))
 
+    def __post_init__(self) -> None:
+        """Raise InputError for values that no driver has."""
+        check(self)
+
 
 @checked_fields
 @dataclass(frozen=True)
@@ -428,3 +450,7 @@ class Safety:
             **json_codec.ADDED,
         },
     )
+
+    def __post_init__(self) -> None:
+        """Raise InputError for values that the board does not know."""
+        check(self)

@@ -15,6 +15,7 @@ from armtempo.model.parts import (
     END_STEPS,
     LEAST_MM_PER_REV,
     LEAST_RATIO,
+    LIMIT_INPUTS,
     MOST_MM_PER_REV,
     MOST_RATIO,
     Curve,
@@ -231,8 +232,10 @@ def _switches(table: Table | None, unit: JointUnit) -> LimitSwitches:
 
 def _switch(table: Table, key: str) -> int | str | None:
     if table.is_text(key):
-        return outputs_file.pin(table, key, "an input from 1 to 3, or a free pin such as PD0 for homing only")
-    return table.integer(key, least=1, most=3) if table.has(key) else None
+        return outputs_file.pin(
+            table, key, f"an input from 1 to {LIMIT_INPUTS}, or a free pin such as PD0 for homing only"
+        )
+    return table.integer(key, least=1, most=LIMIT_INPUTS) if table.has(key) else None
 
 
 def homing(top: Table, names: list[str]) -> tuple[tuple[str, ...], ...]:

@@ -28,6 +28,8 @@ _RADIANS, _WIDE_DEG = 7.0, 100.0
 """Angles below this may be radians, if the joints turn further than that many degrees."""
 _METRES = 2.0
 """Positions below this may be in metres."""
+_SLOWEST = 0.02
+"""A motion in whole seconds that is always below this part of the speed limits may have its times in milliseconds."""
 _ALIKE = 2.0
 """A step of a recording is as its neighbours if it is no faster than this factor."""
 _SPEED_MARGIN = 1.05
@@ -112,6 +114,7 @@ def recorded(
             )
         _check_resting(table, header, arm, radians)
         found = Recorded(times, _angles(table, header, arm, radians), _notes(table, header, arm))
+        _check_seconds(table, header, found.angles_deg, arm)
         where = [f"{path}: line {line}" for line, _ in table.rows]
     angles, notes = _unwound(found.angles_deg, found.times_s, arm, where)
     _check_ranges(where, angles, arm, _tolerance(arm, tolerance_deg))
@@ -148,6 +151,7 @@ def via_points(
     times, notes = _times(table, header), _notes(table, header, arm)
     where = [f"{table.path}: line {line}" for line, _ in table.rows]
     if times is not None:
+        _check_seconds(table, header, angles, arm)
         angles, jumps = _unwound(angles, times, arm, where)
         notes += jumps
     if tolerance_deg is None and times is None:
@@ -380,6 +384,22 @@ def _times(table: NumberTable, header: Header) -> Array | None:
                 "put the lines in order, or leave the column of times out",
             )
     return times
+
+
+def _check_seconds(table: NumberTable, header: Header, angles_deg: Array, arm: Arm) -> None:
+    """Refuse whole numbers as times without a unit at which positions (n, J) move so slowly that they may be
+    milliseconds or less."""
+    times_s = _times(table, header)
+    if times_s is None or header.time is None or header.time.unit or np.any(times_s != np.round(times_s)):
+        return
+    limits = np.array([joint.limits.speed_deg_s for joint in arm.driven])
+    share = float(np.max(np.abs(np.diff(angles_deg, axis=0)) / np.diff(times_s)[:, None] / limits))
+    if 0.0 < share < _SLOWEST:
+        raise InputError(
+            f"{table.path}: line 1: no time has a fraction, and no joint reaches {_SLOWEST:.0%} of its speed limit: "
+            "seconds or milliseconds?",
+            "name the unit in the header: time_s, time_ms, time_us or time_ns",
+        )
 
 
 def _unwound(
