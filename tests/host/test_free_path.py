@@ -17,9 +17,9 @@ from armtempo.model.tool_pose import Pose
 from armtempo.optimise.reduced_kkt import ReducedFactor, ReducedKkt
 from armtempo.planning import checks, collocation, motion_program, planner, rest_to_rest
 from armtempo.planning.collocation import Curve, Ratios
-from armtempo.planning.free import corridor, free_path
+from armtempo.planning.free import corridor, free_path, free_start
 from armtempo.planning.free.angle_bounds import AngleRows
-from armtempo.planning.free.free_motion import Demand, FreeMotion
+from armtempo.planning.free.free_motion import Demand, FreeMotion, Improver, Tolerance
 from armtempo.planning.limit_rows import LimitRows
 from armtempo.planning.tool import Tool
 from armtempo.planning.variables import MotionVariables
@@ -255,6 +255,29 @@ def test_a_pose_with_a_tolerance_is_passed_within_it_and_sooner() -> None:
     assert 0.2 < miss.position_mm <= 10.0 * (1 + 1e-6)
     assert miss.rotation_deg <= 8.0 * (1 + 1e-6)
     assert loose.searches[0].lower_bound_s <= loose.total_s
+
+
+def test_what_exceeds_a_tolerance_by_little_moves_back_by_little() -> None:
+    via = np.array([[0.0, -60.0, 40.0], [20.0, -75.0, 50.0], [40.0, -60.0, 70.0]])
+    low, high = via.min(axis=0) - 90.0, via.max(axis=0) + 90.0
+    limits = np.array([joint.limits.values for joint in ARM.driven])
+    tool, tolerances = Tool(ARM, [0, 1, 2], via[0]), {1: Tolerance(10.0, np.inf)}
+    demand = Demand(("1", "2", "3"), via, limits, low, high, {}, tool=tool, tolerances=tolerances)
+    exact = free_start.along_spline(demand, 8, np.ones(2)).scaled(limits)
+    improver = Improver(demand, exact.layout)
+    bump = np.zeros_like(exact.angle_points_deg)
+    bump[8:13, 0] = 1.0
+
+    def moved(by_deg: float) -> FreeMotion:
+        return replace(exact, angle_points_deg=exact.angle_points_deg + by_deg * bump)
+
+    inside, outside = 0.0, 90.0
+    for _ in range(40):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (inside, middle) if improver._strays(moved(middle)) else (middle, outside)
+    kept = improver._inside(moved(1.0003 * outside), exact)
+    assert not improver._strays(kept)
+    assert 0.99 * outside < np.abs(kept.angle_points_deg - exact.angle_points_deg).max() <= outside
 
 
 @pytest.mark.slow

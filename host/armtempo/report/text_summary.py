@@ -19,6 +19,7 @@ from armtempo.model.joint_unit import DEG, MM, names
 from armtempo.model.plan import Plan, Search
 from armtempo.planning import board_limits, checks, path_deviation, rest_to_rest, torque
 from armtempo.planning.free import free_plan
+from armtempo.planning.free.free_plan import Trial
 from armtempo.report.replayed import JointResult
 from armtempo.splines.trajectory import Trajectory
 
@@ -191,7 +192,7 @@ def _free_s(plan: Plan) -> float:
         return math.inf
     job = replace(plan.job, path="free", degree=5, refine=AUTO, starts=1)
     try:
-        found = free_plan.motion(plan.arm, job, plan.via_deg, lambda _done, _whole: None, trial=True)
+        found = free_plan.motion(plan.arm, job, plan.via_deg, lambda _done, _whole: None, Trial())
     except ArmtempoError:
         return math.inf
     return found.trajectory.duration_s

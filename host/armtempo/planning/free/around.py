@@ -19,6 +19,7 @@ from armtempo.model.job import Job
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import workspace_check
 from armtempo.planning.free import free_plan
+from armtempo.planning.free.free_plan import Trial
 from armtempo.planning.through_plan import Planned
 from armtempo.planning.workspace_check import Bodies, Touch
 
@@ -73,14 +74,14 @@ def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, nearest: bool
         helped = _helped(job, paths)
         angles = np.concatenate([paths[0], *(path[1:] for path in paths[1:])])
         try:
-            planned = free_plan.motion(arm, helped, angles, progress, trial=True)
+            planned = free_plan.motion(arm, helped, angles, progress, Trial(led=True))
         except PlanError:
             break
         if not (touch := _touch(arm, job, planned)):
             own = set(_places(paths).tolist())
             if nearest:
                 planned = _loosened(arm, helped, angles, own, planned, progress)
-            return _without_help(arm, job, via_deg, planned, paths, names)
+            return _without_help(first, planned, paths, names)
     return first
 
 
@@ -104,7 +105,10 @@ def _loosened(
         ]
         try:
             loose = replace(helped, via=tuple(via))
-            found = free_plan.motion(arm, loose, angles, progress, trial=True, known=planned)
+            found = free_plan.motion(arm, loose, angles, progress, Trial(known=planned, rounds=1))
+            if _touch(arm, helped, found) is not None:
+                continue
+            found = free_plan.motion(arm, loose, angles, progress, Trial(known=found))
         except PlanError:
             continue
         faster = found.trajectory.duration_s < planned.trajectory.duration_s
@@ -137,22 +141,20 @@ def _helped(job: Job, paths: Sequence[Array]) -> Job:
     return replace(job, via=tuple(via), stops=stops)
 
 
-def _without_help(
-    arm: Arm, job: Job, via_deg: Array, planned: Planned, paths: Sequence[Array], names: set[str]
-) -> Planned:
-    """The motion described by the job's own via points only."""
+def _without_help(first: Planned, planned: Planned, paths: Sequence[Array], names: set[str]) -> Planned:
+    """The motion described by the job's own via points only, with the bounds of the ``first``, which touches."""
     places = _places(paths)
     joints = []
     for joint in planned.trajectory.joints:
         assert joint.via_segments is not None  # a free path has these
         joints.append(replace(joint, via_segments=tuple(joint.via_segments[place] for place in places)))
-    searches = []
-    for search in planned.searches:
-        bound = free_plan.lower_bound_of(arm, job, via_deg, list(search.joints))
-        searches.append(replace(search, lower_bound_s=bound.time_s, lower_bound_kind=bound.kind))
+    searches = tuple(
+        replace(search, lower_bound_s=of.lower_bound_s, lower_bound_kind=of.lower_bound_kind)
+        for search, of in zip(planned.searches, first.searches, strict=True)
+    )
     note = f"the path goes around {', '.join(sorted(names))}"
     trajectory = replace(planned.trajectory, joints=tuple(joints))
-    return Planned(trajectory, tuple(searches), (*planned.notes, note))
+    return Planned(trajectory, searches, (*planned.notes, note))
 
 
 @dataclass(frozen=True, eq=False)

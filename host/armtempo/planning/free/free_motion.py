@@ -57,6 +57,8 @@ _ROUNDED = 1e-10
 """Relative excess over a bound that is only rounding."""
 _PART_OUT = 0.9
 """How far a motion beyond a bound is moved towards the bound, as seen from one within: a solve starts inside."""
+_PARTS_KEPT = (1.0, 0.999, 0.99, 0.9, 0.5)
+"""The same for one that exceeds a tolerance of the tool, until it keeps them."""
 _AT_END = 1e-6
 """A via point this close to the end of a range (fraction of the joint's motion) counts as at the end."""
 _WORSE = 1.1
@@ -288,20 +290,21 @@ class Improver:
         return best
 
     def _inside(self, motion: FreeMotion, within: FreeMotion) -> FreeMotion:
-        """The motion, moved towards ``within`` if the exact via points have moved it out of the bounds."""
-        if self._strays(motion):
-            return within
+        """The motion, moved towards ``within`` if it exceeds a tolerance of the tool, or the exact via points have
+        moved it out of the bounds."""
         found, safe = (self._beyond(each) for each in (motion, within))
         out = found > _ROUNDED
-        if not out.any():
-            return motion
-        part = float(np.min((_ROUNDED - safe[out]) / (found[out] - safe[out])))
-        if self._targets is not None or not part > 0.0:
-            return within
-        points = within.angle_points_deg + _PART_OUT * part * (
-            motion.angle_points_deg - within.angle_points_deg
-        )
-        return replace(motion, angle_points_deg=points)
+        part = 1.0
+        if out.any():
+            part = _PART_OUT * float(np.min((_ROUNDED - safe[out]) / (found[out] - safe[out])))
+        change = motion.angle_points_deg - within.angle_points_deg
+        for less in _PARTS_KEPT if self._targets is not None else (1.0,):
+            near = motion
+            if less * part < 1.0:
+                near = replace(motion, angle_points_deg=within.angle_points_deg + less * part * change)
+            if part > 0.0 and not self._strays(near):
+                return near
+        return within
 
     def _strays(self, motion: FreeMotion) -> bool:
         """Whether the tool exceeds a tolerance at a point."""

@@ -23,7 +23,7 @@ _PIECES, _LEAST = 32, 96
 """Segments of an automatic layout: per leg between via points, and least total."""
 _EVEN_PIECES = 24
 """Segments per leg if all have the same number."""
-_ROUNDS = 8
+ROUNDS = 8
 """Solves on the final segments, each with the peaks of the one before; fewer if the limits hold between points."""
 _SPREAD = 0.5
 """Standard deviation of the logarithm of the random factors on the legs' times."""
@@ -47,6 +47,10 @@ class Effort:
     """Differences of a time axis of the spline through the via points: if given, the only start in a corridor."""
     known: Shortest | None = None
     """A motion without some of the tolerances, from which one with them starts."""
+    led: bool = False
+    """Whether via points lead along a path that was found before: then one start will do."""
+    rounds: int = ROUNDS
+    """Solves with tolerances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +70,17 @@ def shortest(demand: Demand, effort: Effort, progress: Progress) -> Shortest:
     """
     if demand.tolerances:
         exact = effort.known or shortest(replace(demand, tolerances={}), effort, progress)
-        looser = Improver(_tightened(demand), exact.motion.layout).improved(exact.motion, _ROUNDS)
+        looser = Improver(_tightened(demand), exact.motion.layout).improved(exact.motion, effort.rounds)
         return replace(exact, motion=_within_corridor(demand, looser))
     even = effort.pieces is not None or _in_corridor(demand)
     starts = _starts(_tightened(demand), effort, even)
-    whole = len(starts) + _ROUNDS
+    whole = len(starts) + ROUNDS
     best: FreeMotion | None = None
     times: list[float] = []
     problem: PlanError | None = None
     for number, start in enumerate(starts):
+        if effort.led and best is not None:
+            break
         stage(f"start {number + 1} of {len(starts)}")
         try:
             motion = start()
@@ -105,7 +111,7 @@ def _faster_than_stopping(
     stage("starting from stops")
     stopping = shortest(replace(demand, stops=every), effort, progress).motion
     start = replace(stopping, layout=Layout(stopping.layout.pieces, demand.stops))
-    found = Improver(demand, start.layout).improved(start, _ROUNDS)
+    found = Improver(demand, start.layout).improved(start, ROUNDS)
     return min(motion, found, key=lambda each: each.total_s)
 
 
@@ -135,7 +141,8 @@ def _starts(demand: Demand, effort: Effort, even: bool) -> list[Callable[[], Fre
         if not even:
             chosen = layout.shared_out(shares, chosen.segments, demand.stops)
         starts.append(partial(free_start.smooth, demand, chosen, shares))
-    return starts
+    # the spline swings where via points that lead along a path are at uneven distances
+    return starts[1:] + starts[:1] if effort.led else starts
 
 
 def _finished(demand: Demand, motion: FreeMotion, effort: Effort, even: bool) -> FreeMotion:
@@ -150,13 +157,13 @@ def _finished(demand: Demand, motion: FreeMotion, effort: Effort, even: bool) ->
             key=lambda each: each.total_s,
         )
     else:
-        motion = Improver(tightened, motion.layout).improved(motion, _ROUNDS)
+        motion = Improver(tightened, motion.layout).improved(motion, ROUNDS)
     return _within_corridor(demand, motion)
 
 
 def _resampled(demand: Demand, finer: Layout, motion: FreeMotion) -> FreeMotion:
     start = free_start.resampled(demand, finer, motion)
-    return Improver(demand, finer).improved(start, _ROUNDS)
+    return Improver(demand, finer).improved(start, ROUNDS)
 
 
 def _in_corridor(demand: Demand) -> bool:

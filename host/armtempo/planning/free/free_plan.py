@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,14 +47,25 @@ _WIDER = 0.5 * checks.TOLERANCE
 """Relative widening of ranges, so that a via point at their end is inside."""
 
 
-def motion(
-    arm: Arm, job: Job, via_deg: Array, progress: Progress, trial: bool = False, known: Planned | None = None
-) -> Planned:
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """How to plan a motion that only leads to another, or to its time.
+
+    ``led``: whether the via points lead along a path that was found before; then one start will do. ``known``: a
+    motion of the job with shared timing, without some of the tolerances; it is not planned again. ``rounds``: solves
+    with the tolerances.
+    """
+
+    led: bool = False
+    known: Planned | None = None
+    rounds: int = free_path.ROUNDS
+
+
+def motion(arm: Arm, job: Job, via_deg: Array, progress: Progress, trial: Trial | None = None) -> Planned:
     """The motion through via angles (n + 1, J), or near them at poses with a tolerance.
 
-    ``trial``: without its lower bound, which takes time; it is 0 then. ``known``: a motion of the job with shared
-    timing, without some of the tolerances; it is not planned again. Raises InputError for a job that the board cannot
-    hold, PlanError if no path stays within the ranges.
+    A ``trial`` is planned without its lower bound, which takes time; it is 0 then. Raises InputError for a job that
+    the board cannot hold, PlanError if no path stays within the ranges.
     """
     most = _most_segments(arm, job, len(via_deg))
     spline = None
@@ -70,8 +81,9 @@ def motion(
         if pieces is None and len(groups) > 1:
             pieces = free_path.automatic_pieces(len(via_deg) - 1, most)
         effort = Effort(pieces, most, job.starts, np.random.default_rng([job.seed, joints[0]]))
-        if known is not None:
-            effort = replace(effort, known=_shortest(known, demand))
+        if trial is not None:
+            known = None if trial.known is None else _shortest(trial.known, demand)
+            effort = replace(effort, led=trial.led, known=known, rounds=trial.rounds)
         if spline is not None:
             pieces = pieces or free_path.automatic_pieces(len(via_deg) - 1, most)
             effort = replace(effort, along_s=_axis_s(demand, spline, pieces))
@@ -86,7 +98,8 @@ def motion(
     points = np.stack([joint.angle_points_deg for joint in trajectory.joints], axis=1)
     checks.check_ranges(arm, points, DEGREE)
     searches = tuple(
-        _search(arm, job, via_deg, joints, one, trial) for joints, one in zip(groups, found, strict=True)
+        _search(arm, job, via_deg, joints, one, trial is not None)
+        for joints, one in zip(groups, found, strict=True)
     )
     return Planned(trajectory, searches, _notes(arm, job, via_deg, groups, found))
 
