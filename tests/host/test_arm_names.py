@@ -78,6 +78,26 @@ def test_another_name_is_given_where_the_file_uses_it(file: Path, end: str) -> N
     assert file.read_bytes() == b"\xef\xbb\xbf" + expected.encode()
 
 
+def test_a_sequence_begins_at_a_posture_too_and_may_be_of_another_arm(file: Path) -> None:
+    folder, text = (
+        file.parent,
+        'name = "night"\nstart = "away"\n[posture.low]\nangles_deg = [0, 0, 0, 0, 0, 0]\n',
+    )
+    (folder / "night.toml").write_text(text)
+    (folder / "others.toml").write_text('arm = "scara"\n' + text)
+    (folder / "mine.toml").write_text('arm = "arm.toml"\n' + text)
+    found = arm_names.uses_in_files(file, folder, "posture", "away")
+    assert [(use.file.name, use.line) for use in found if use.file.name[0] in "nom"] == [
+        ("mine.toml", 3),
+        ("night.toml", 2),
+    ]
+    with pytest.raises(InputError, match=r"mine\.toml has a posture 'low' of its own"):
+        arm_names.rename(file, "posture", "away", "low", folder)
+    arm_names.rename(file, "posture", "away", "up", folder)
+    assert 'start = "up"' in (folder / "night.toml").read_text()
+    assert 'start = "away"' in (folder / "others.toml").read_text()
+
+
 def _contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import platform
 import random
+import subprocess
+import sys
 from contextlib import suppress
 from dataclasses import replace
 
@@ -240,6 +243,25 @@ def test_the_first_step_comes_within_50_ms(name: str) -> None:
         begin, soon = arm.transmission.steps(trajectory(np.array([0.0, 0.05]))) - stands
         assert np.abs(begin).max() == pytest.approx(point_to_point.AHEAD_STEPS, abs=0.005)
         assert np.any(np.rint(soon) != 0.0)
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
+def test_the_plan_of_a_jog_takes_no_new_memory_each_time() -> None:
+    """Memory that is given back is zeroed page by page when it is needed again; in a process with a heap of its own."""
+    program = """
+import math, resource
+from armtempo.model.arm import Arm
+from armtempo.planning.jog import jog_motion
+faults = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+arm, move = Arm.load("ar4"), jog_motion.JogMove(math.inf, joint=0)
+for times in (3, 10):
+    before = faults()
+    for _ in range(times):
+        jog_motion.plan("jog", arm, arm.home_deg, move)
+print((faults() - before) / times)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert float(done.stdout) < 150, done.stdout
 
 
 def test_a_way_of_a_step_begins_where_the_arm_stands() -> None:

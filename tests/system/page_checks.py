@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-VIEWS = {"wide": (1366, 768), "tablet": (1024, 768), "phone": (390, 844)}
+VIEWS = {"desktop": (1440, 900), "wide": (1366, 768), "tablet": (1024, 768), "phone": (390, 844)}
 _PROBLEMS = """() => {
   const found = [], view = document.documentElement;
   const seen = (one) => one.checkVisibility({visibilityProperty: true, opacityProperty: true});
@@ -30,6 +30,14 @@ _PROBLEMS = """() => {
     const on = document.elementFromPoint(across, down);
     const field = one.closest('.q-field, .q-slider, .q-toggle, .q-checkbox, button, [role=tab]') || one;
     if (on && !field.contains(on) && !on.contains(one)) found.push(`covered: ${name(one)} by ${name(on)}`);
+  }
+
+  for (const label of document.querySelectorAll('.q-field--float .q-field__label')) {
+    const value = label.closest('.q-field').querySelector('.q-field__native');
+    if (!value || !seen(label)) continue;
+    const box = value.getBoundingClientRect(), style = getComputedStyle(value);
+    const middle = (box.top + parseFloat(style.paddingTop) + box.bottom - parseFloat(style.paddingBottom)) / 2;
+    if (label.getBoundingClientRect().bottom > middle) found.push(`label over its value: ${name(label)}`);
   }
 
   // Contrast of text, WCAG 2.1: 4.5 to 1, or 3 to 1 if it is large

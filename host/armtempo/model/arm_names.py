@@ -19,7 +19,7 @@ from armtempo.model.arm import Arm
 POSTURE = "posture"
 KINDS = (POSTURE, frame.KIND, tool.KIND)
 """Tables [KIND.NAME] of an arm file that can get another name."""
-_USES = {POSTURE: (POSTURE, "goto"), frame.KIND: (frame.KIND,), tool.KIND: (tool.KIND,)}
+_USES = {POSTURE: (POSTURE, "goto", "start"), frame.KIND: (frame.KIND,), tool.KIND: (tool.KIND,)}
 """Keys of arm files, jobs and sequences whose value is a name of each kind."""
 _HEADER = re.compile(r"\s*\[\[?[^\[\],]+\]\]?\s*(#.*)?")
 
@@ -35,7 +35,7 @@ class Use:
 
     file: Path
     line: int
-    """From 1."""
+    """From 1; 0 for what is edited and not saved."""
     text: str
     """Of the line."""
     follows: bool
@@ -54,14 +54,25 @@ def uses_in_files(file: Path, folder: Path, kind: str, name: str) -> list[Use]:
 def _others(file: Path, folder: Path) -> list[Path]:
     """The files of a folder that may use a name of an arm file."""
     paths = sorted([*folder.glob("*.toml"), *folder.glob("*.py")])
-    return [path for path in paths if path.resolve() != file.resolve() and not _is_arm(path)]
+    return [path for path in paths if path.resolve() != file.resolve() and not _is_of_another_arm(path, file)]
 
 
-def _is_arm(path: Path) -> bool:
+def _is_of_another_arm(path: Path, file: Path) -> bool:
+    """Whether a file is an arm, or a sequence that names one, other than ``file``."""
+    content = _content(path)
+    named = content.get("arm")
+    if not isinstance(named, str):
+        return "joint" in content
+    beside = path.parent / named
+    return (beside if beside.is_file() else Path(named)).resolve() != file.resolve()
+
+
+def _content(path: Path) -> dict[str, Any]:
+    """What a TOML file says; nothing for what is none."""
     try:
-        return path.suffix == ".toml" and "joint" in taught.content(taught.read_text(path))
+        return taught.content(taught.read_text(path)) if path.suffix == ".toml" else {}
     except (InputError, ValueError):
-        return False
+        return {}
 
 
 def _uses_in(path: Path, kind: str, name: str) -> list[Use]:
@@ -123,6 +134,10 @@ def rename(file: Path, kind: str, name: str, new: str, folder: Path | None = Non
     _check_name(kind, new)
     if new in taught.names(file, kind):
         raise InputError(f"there is a {kind} {new!r} already", "choose another name")
+    for path in _others(file, folder or file.parent):
+        own = _content(path).get(POSTURE)
+        if kind == POSTURE and isinstance(own, Mapping) and new in own:
+            raise InputError(f"{path.name} has a posture {new!r} of its own", "choose another name")
     text = taught.read_text(file)
     header = re.compile(rf"(?m)^(\s*\[\s*{kind}\s*\.\s*)([\"']?){re.escape(name)}\2(?=\s*[\].])")
     changed = header.sub(rf"\g<1>{new}", _changed(text, kind, name, new))

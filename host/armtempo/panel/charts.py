@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 from nicegui import ui
 
@@ -57,8 +59,7 @@ class CurveChart:
         if reference is not None:
             series += [self._curve(number, times_s, reference[:, number], of_plan=True) for number in joints]
         self._place.set_visibility(True)
-        # Not as an item of NiceGUI's dictionary, which would watch each of thousands of points, in 20 ms
-        dict.__setitem__(self.chart.options, "series", series)
+        self.chart.options["series"] = series
         self.chart.update()
 
     def mark(self, time_s: float) -> None:
@@ -68,13 +69,13 @@ class CurveChart:
         )
 
     def _curve(self, number: int, times_s: Array, values: Array, of_plan: bool = False) -> dict[str, object]:
-        points = np.column_stack((times_s, values)).round(4).tolist()
+        points = json.dumps(np.column_stack((times_s, values)).round(4).tolist())
         curve: dict[str, object] = {
             "name": words.plain(self._arm.driven[number].labelled),
             "type": "line",
             "showSymbol": False,
             "color": COLOURS[number % len(COLOURS)],
-            "data": points,
+            ":data": points,  # as JavaScript: in a list NiceGUI would watch each of thousands of numbers, in 20 ms
         }
         if of_plan:
             name = words.IN_PLAN.format(name=curve["name"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,23 +14,18 @@ from tomlkit.items import Array
 from armtempo.basics import toml_table
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.encoding import planned_for
-from armtempo.kinematics.of_arm import forward
-from armtempo.model import tool_segment
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.joint_unit import NEUTRAL
 from armtempo.model.plan import Plan
-from armtempo.model.pose import to_rpy_deg
-from armtempo.model.tool_pose import BASE, WHOLE
-from armtempo.panel.file_editor import FileEditor, put, text_of
+from armtempo.model.tool_pose import BASE
+from armtempo.panel.file_editor import FileEditor, put
 from armtempo.panel.toml_blocks import TomlBlocks
+from armtempo.panel.via_rows import ANGLES, POSE, WHERE, Via, key_in, pose_values, rounded, set_where, via_of
 from armtempo.planning import planner
 
 _NEW = "panel_job"
-ANGLES, POSE, POSTURE = "angles_deg", "position_mm", "posture"
 _LIST = "via_deg"
-FORMS = (ANGLES, POSE, "matrix", POSTURE)
-"""Keys that say where a via point is, one of them."""
 OPTIONS = (
     "path",
     "corridor_deg",
@@ -46,26 +40,6 @@ OPTIONS = (
     "tool",
 )
 """Keys of the job that are edited as fields."""
-WAY_KEYS = (*tool_segment.KEYS, "stop", "dwell_s")
-"""Keys of a via point that are edited as fields, besides where it is."""
-_PLACES = 4
-"""Decimal places of an angle that is taken from the arm or the picture: 0.0001 deg is less than a step."""
-
-
-@dataclass(frozen=True)
-class Via:
-    """A via point of the table."""
-
-    form: str
-    """The key that says where it is: one of FORMS."""
-    values: dict[str, Any] = field(default_factory=dict)
-    """Its keys in the file."""
-    angles_deg: tuple[float, ...] | None = None
-    """The driven joints' angles, degrees (J,); None while a pose has none."""
-
-    def text(self, key: str) -> str:
-        """The value of a key as it is typed; "" if it is not given."""
-        return text_of(self.values.get(key))
 
 
 class JobEditor(FileEditor):
@@ -137,7 +111,7 @@ class JobEditor(FileEditor):
     @property
     def _present(self) -> tuple[int, list[Via], bool]:
         if (found := self._solved)[0] != self.version:
-            given = [_via(values) for values in self._rows()]
+            given = [via_of(values) for values in self._rows()]
             found = self.version, given, all(via.angles_deg is not None for via in given)
             self._solved = found
         return found
@@ -218,15 +192,15 @@ class JobEditor(FileEditor):
         if self._is_list:
             self._change_list(lambda rows: rows[number].__setitem__(joint, value))
         else:
-            self._change_table(number, lambda table: table[_key_in(table)].__setitem__(joint, value))
+            self._change_table(number, lambda table: table[key_in(table)].__setitem__(joint, value))
 
     def set_angles(self, number: int, angles_deg: Sequence[float]) -> None:
         """Give a via point by these angles, degrees (J,), instead of what it was given by."""
-        values = _rounded(angles_deg)
+        values = rounded(angles_deg)
         if self._is_list:
             self._change_list(lambda rows: rows.__setitem__(number, values))
         else:
-            self._change_table(number, lambda table: _place(table, self._written({ANGLES: values})))
+            self._change_table(number, lambda table: set_where(table, self._written({ANGLES: values})))
 
     def set_key(self, number: int, key: str, text: str) -> None:
         """Set a key of a via point; "" removes it."""
@@ -266,7 +240,7 @@ class JobEditor(FileEditor):
     def set_pose(self, number: int) -> None:
         """Give a via point by the pose of the tool there; raises InputError for an arm that has no form of a pose."""
         pose = pose_values(self.tooled_arm, self._angles(number), self._frame(number))
-        self._change_table(number, lambda table: _place(table, pose))
+        self._change_table(number, lambda table: set_where(table, pose))
 
     def set_own_angles(self, number: int) -> None:
         """Give a via point by its angles; raises InputError if it has none."""
@@ -278,8 +252,8 @@ class JobEditor(FileEditor):
             given = self.vias
             before = given[max(0, number - 1)].values if given else {ANGLES: list(self.arm.home_deg)}
             pose = {"frame"} if POSE in before or "matrix" in before else set()
-            values = {key: value for key, value in before.items() if key in {*_WHERE, *pose}}
-        found = values if isinstance(values, dict) else {ANGLES: _rounded(values)}
+            values = {key: value for key, value in before.items() if key in {*WHERE, *pose}}
+        found = values if isinstance(values, dict) else {ANGLES: rounded(values)}
         if self._is_list and set(found) == {ANGLES}:
             self._change_list(lambda rows: rows.insert(number, found[ANGLES]))
         else:
@@ -309,7 +283,7 @@ class JobEditor(FileEditor):
 
     def set_vias(self, vias: Sequence[dict[str, Any]]) -> None:
         """Replace all via points by these, given by keys; raises InputError if keys of the others would be lost."""
-        if any(set(via.values) - {*_WHERE, "frame"} for via in self.vias):
+        if any(set(via.values) - {*WHERE, "frame"} for via in self.vias):
             raise InputError(
                 "the via points have keys, such as lines, that the pasted rows do not have",
                 "make a new job for the rows",
@@ -322,7 +296,7 @@ class JobEditor(FileEditor):
         if all(set(via) == {ANGLES} for via in vias):
             rows = tomlkit.array()
             for via in vias:
-                rows.append(_rounded(via[ANGLES]))
+                rows.append(rounded(via[ANGLES]))
             document[listed] = rows.multiline(True)
         blocks = TomlBlocks(tomlkit.dumps(document), "via")
         for via in vias if listed not in document else ():
@@ -367,55 +341,3 @@ class JobEditor(FileEditor):
         for row in self._rows():
             blocks.insert(len(blocks.tables), self._written(row))
         return blocks.text
-
-
-def pose_values(arm: Arm, angles_deg: Sequence[float], frame: str = BASE) -> dict[str, Any]:
-    """The keys of a pose of the tool in a frame at angles (J,), with as many components as the arm has joints.
-
-    Raises InputError for an arm with too few joints for one.
-    """
-    pose = np.linalg.inv(arm.frame(frame)) @ forward(arm, list(angles_deg))
-    position = [round(float(value), 3) + 0.0 for value in pose[:3, 3]]
-    turns = [round(value, 3) + 0.0 for value in to_rpy_deg(pose)]
-    orientations: dict[int, dict[str, Any]] = {
-        3: {},
-        4: {"pitch_deg": turns[1]},
-        5: {"approach": [round(float(value), 6) + 0.0 for value in pose[:3, 2]]},
-        6: {"rpy_deg": turns},
-    }
-    if (joints := len(arm.driven)) not in orientations:
-        raise InputError(f"an arm with {joints} driven joints has no pose of its own", "give angles")
-    return {POSE: position, **orientations[joints]}
-
-
-_WHERE = (
-    *(*FORMS, "rpy_deg", "quaternion", "approach", "posture_deg"),
-    *(NEUTRAL[ANGLES], NEUTRAL["posture_deg"]),
-    *(f"{name}_deg" for name in WHOLE),
-)
-"""Keys that say where a via point is."""
-
-
-def _key_in(table: Any) -> str:
-    """The key of a list of positions in a table."""
-    return NEUTRAL[ANGLES] if NEUTRAL[ANGLES] in table else ANGLES
-
-
-def _via(values: dict[str, Any]) -> Via:
-    form = next((key for key in FORMS if key in values), ANGLES)
-    angles = values.get(ANGLES)
-    known = form == ANGLES and isinstance(angles, list) and all(type(one) in (int, float) for one in angles)
-    return Via(form, values, tuple(map(float, angles)) if known and angles else None)
-
-
-def _rounded(angles_deg: Sequence[float]) -> list[float]:
-    return [round(float(angle), _PLACES) + 0.0 for angle in angles_deg]
-
-
-def _place(table: Any, values: dict[str, Any]) -> None:
-    """Say where a via point is by other keys; its frame stays with what is given in it."""
-    for key in _WHERE:
-        table.pop(key, None)
-    if POSE not in values and not any(key in table for key in tool_segment.POINTS):
-        table.pop("frame", None)
-    table.update(values)

@@ -10,6 +10,7 @@ import numpy as np
 from nicegui import background_tasks, run, ui
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.kinematics.solver import moved_tool_deg
 from armtempo.model import via_table
@@ -17,9 +18,11 @@ from armtempo.model.job import DEGREES, PATHS, TIMINGS
 from armtempo.panel import words
 from armtempo.panel.fields import Fields
 from armtempo.panel.file_row import FileRow
-from armtempo.panel.job_editor import ANGLES, OPTIONS, POSE, WAY_KEYS, Via
+from armtempo.panel.job_editor import OPTIONS
 from armtempo.panel.job_plan import JobPlan
+from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import build_rows, named
+from armtempo.panel.via_rows import ANGLES, POSE, WAY_KEYS, Via
 
 if TYPE_CHECKING:
     from armtempo.panel.panel_page import PanelPage
@@ -169,8 +172,14 @@ class JobTab:
         self._edit(call, *given, str(event.args or "").strip())
 
     def _edit(self, call: Callable[..., object], *arguments: Any) -> None:
-        """Change the table by a button."""
-        self._page.attempt(lambda: call(*arguments))
+        """Change the job, if this page has control."""
+
+        def change() -> None:
+            if reason := self._operator.why_not(self._page.client, Needs.CONTROL):
+                raise InputError(reason)
+            call(*arguments)
+
+        self._page.attempt(change)
         self._look()
 
     def _take_posture(self) -> None:

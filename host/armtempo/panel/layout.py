@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
-from collections.abc import Awaitable
-from contextlib import suppress
+from collections.abc import Awaitable, Callable, Iterator
 from functools import partial
 from pathlib import Path
 from threading import Thread
@@ -13,11 +13,18 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import tool_path_mm
-from armtempo.kinematics.of_arm import forward
-from armtempo.model.pose import to_rpy_deg
-from armtempo.panel import arm_scene, board_tab, job_tab, move_tab, problem, run_tab, sequence_tab, words
+from armtempo.panel import (
+    arm_scene,
+    board_tab,
+    job_tab,
+    live_texts,
+    move_tab,
+    problem,
+    run_tab,
+    sequence_tab,
+    words,
+)
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.hold import ButtonHold
 from armtempo.panel.panel_board import Needs, PanelBoard
@@ -26,8 +33,6 @@ from armtempo.panel.press import Press
 from armtempo.robot.board import Board
 
 TELL_S = 0.1
-OLD_S = 0.5
-"""A state that is older than this is shown with its age."""
 LEFT_S = 1.0
 """A slider that was not moved for this long is not being dragged."""
 _POINTS = 200
@@ -37,23 +42,26 @@ _SCRIPT = Path(__file__).with_name("panel.js").read_text(encoding="utf-8")
 _STYLE = Path(__file__).with_name("panel.css").read_text(encoding="utf-8")
 
 
-def build(operator: PanelBoard, hold: ButtonHold, shape: ArmShape) -> PanelPage:
-    """The page of a client."""
+async def build(operator: PanelBoard, hold: ButtonHold, shape: ArmShape) -> PanelPage:
+    """The page of a client, with pauses, in which the server hears the stops of other pages."""
     client = ui.context.client
     page = PanelPage(operator, hold, shape, client.id)
     ui.add_css(_STYLE)
-    ui.add_body_html(f"<script>{_SCRIPT}</script>")
+    lost = json.dumps({"lost": words.LOST})
+    ui.add_body_html(f"<script>{_SCRIPT}armtempo.wait({lost});</script>")
     ui.dark_mode(None)
     ui.colors(primary=_PRIMARY)
     with ui.element("div").classes("armtempo-page"):
         _header(page)
         problem.build(page)
+        await asyncio.sleep(0)
         with ui.element("div").classes("armtempo-main"):
             with ui.element("div").classes("armtempo-picture"):
                 page.picture = ui.element("div").classes("armtempo-scene")
                 _views(page)
             with ui.element("div").classes("armtempo-tabs"):
-                _tabs(page)
+                for _ in _tabs(page):
+                    await asyncio.sleep(0)
         _dock(page)
     page.on_look(Paths(page).look)
     _events(page)
@@ -73,7 +81,7 @@ def _header(page: PanelPage) -> None:
         freeze.classes("armtempo-freeze").props("no-caps outline").tooltip(words.FREEZE_HINT)
         with ui.element("div").classes("armtempo-title"):
             ui.label(f"{words.TITLE} · {words.plain(operator.arm.name)}").classes("armtempo-name-of-arm")
-            ui.label("").props('id="armtempo-state" role="status"')
+            page.live_label("armtempo-state").props('role="status"')
         take = ui.button(words.TAKE_CONTROL).props("outline color=white no-caps").classes("armtempo-take")
 
         def taken(press: Press, _: object) -> None:
@@ -114,8 +122,8 @@ def _dock(page: PanelPage) -> None:
         return words.NOT_PAUSED if state is not None and state.speed_percent else ""
 
     with ui.element("footer").classes("armtempo-dock"):
-        ui.label("").props('id="armtempo-where"')
-        ui.label("").props('id="armtempo-said" role="status"')
+        page.live_label("armtempo-where")
+        page.live_label("armtempo-said").props('role="status"')
         with ui.element("div").classes("armtempo-speeds"):
             for text, icon, call, why_not in (
                 (words.PAUSE, "pause", Board.pause, str),
@@ -180,8 +188,9 @@ class Paths:
             scene.draw("run", path, arm_scene.RUN)
 
 
-def _tabs(page: PanelPage) -> None:
-    parts = {
+def _tabs(page: PanelPage) -> Iterator[None]:
+    """The tabs; the first one is built at once, with pauses."""
+    parts: dict[str, Callable[[PanelPage], object]] = {
         words.TAB_MOVE: move_tab.build,
         words.TAB_JOB: job_tab.build,
         words.TAB_RUN: run_tab.build,
@@ -205,7 +214,10 @@ def _tabs(page: PanelPage) -> None:
         page.refresh()
 
     shown.on_value_change(lambda event: show(event.value))
-    show(words.TAB_MOVE)
+    page.shown, build_first = words.TAB_MOVE, parts.pop(words.TAB_MOVE)
+    with places[words.TAB_MOVE]:
+        yield from page.parts(words.TAB_MOVE, lambda: build_first(page))
+    page.refresh()
 
 
 def _aside(call: Any) -> None:
@@ -230,22 +242,13 @@ def _events(page: PanelPage) -> None:
     ui.on("armtempo-press", lambda event: page.answer(event.args, page.refusal(lambda: press(event))))
     ui.on("armtempo-held", lambda event: page.attempt(lambda: hold.alive(page.client, Press.of(event.args))))
     ui.on("armtempo-release", released)
-    texts = json.dumps({"lost": words.LOST})
-    ui.run_javascript(f"armtempo.begin({texts})")
+    ui.run_javascript("armtempo.begin()")
 
 
 def message(operator: PanelBoard, shape: ArmShape) -> dict[str, Any]:
     """The message to all pages: poses of the arm, and numbers that change during a motion."""
     live = operator.live
     angles, target = live.angles_deg, live.target_deg
-    said = operator.log.last[-1] if operator.log.last else ""
-    texts = {
-        "armtempo-state": words.plain(state_line(operator)),
-        "armtempo-where": position(operator) if live.known else words.UNKNOWN,
-        "armtempo-said": words.plain(said),
-    }
-    for number, (angle, joint) in enumerate(zip(angles, operator.arm.driven, strict=True), 1):
-        texts[f"armtempo-angle-{number}"] = f"{angle:.2f}{joint.unit.sign}" if live.known else "?"
     poses = shape.poses(angles)
     return {
         "clock_s": operator.presses.clock(),
@@ -256,38 +259,5 @@ def message(operator: PanelBoard, shape: ArmShape) -> dict[str, Any]:
         "ghost": poses if not live.known else None if target is None else shape.poses(target),
         "unknown": not live.known,
         "freeze": operator.can_freeze,
-        "texts": texts,
+        "texts": live_texts.texts(operator),
     }
-
-
-def position(operator: PanelBoard) -> str:
-    """Where the tool and the joints are."""
-    angles = operator.live.angles_deg
-    pairs = zip(angles, operator.arm.driven, strict=True)
-    where = "  ".join(f"{angle:.2f}{joint.unit.sign}" for angle, joint in pairs)
-    with suppress(InputError):
-        pose = forward(operator.arm, angles)
-        x, y, z = pose[:3, 3].round(1) + 0.0  # no -0.0
-        roll, pitch, yaw = np.round(to_rpy_deg(pose), 1) + 0.0
-        return f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm  ·  roll {roll:.1f}  pitch {pitch:.1f}  yaw {yaw:.1f}°  ·  {where}"
-    return where
-
-
-def state_line(operator: PanelBoard) -> str:
-    """The board's state in a line, with its age if that is more than OLD_S."""
-    doing = f" · {operator.busy}" if operator.busy else ""
-    if operator.busy and operator.progress:
-        doing += f" {operator.progress:.0%}"
-    state = operator.live.state
-    if state is None:  # its program is being deployed
-        return f"{operator.port}{doing}"
-    age_s = operator.live.age_s
-    old = f" · {words.OLD_STATE.format(age=age_s)}" if age_s > OLD_S else ""
-    kind = f" ({words.VIRTUAL})" if state.virtual else ""
-    name = state.state
-    if state.moving and not state.speed_percent:
-        name = words.PAUSED
-    elif state.moving and state.speed_percent != 100:
-        name += f" {words.AT_SPEED.format(percent=state.speed_percent)}"
-    fault = f" · {state.fault}" if state.fault else ""
-    return f"{name}{doing}{old} · {state.port}{kind}{fault}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -39,19 +39,24 @@ class MoveTab:
         self._step: str | float = HOLD
         self._places: dict[str, ui.column] = {}
         """Of the jogs that were built: of the joints, then of frames."""
-        self._jogs()
+
+    def parts(self) -> Iterator[None]:
+        """Build them with pauses, in which the server hears the stops of other pages."""
+        page = self._page
+        yield from self._jogs()
         floor.build(page)
         self._home_and_teach()
-        targets.build(page)
-        teach_points.build(page)
-        names.build(page)
+        yield
+        for build in (targets.build, teach_points.build, names.build):
+            build(page)
+            yield
         _outputs(page)
         _inputs(page)
         page.on_arm(self._changed)
 
     # jogs
 
-    def _jogs(self) -> None:
+    def _jogs(self) -> Iterator[None]:
         page = self._page
         with ui.row().classes("armtempo-choices"):
             self._frames = ui.toggle(self._frame_names(), value=JOINTS)
@@ -60,8 +65,10 @@ class MoveTab:
             steps = ui.toggle(STEPS, value=HOLD, on_change=lambda event: setattr(self, "_step", event.value))
             named(steps.props("dense no-caps unelevated"), words.STEP_OF_JOG)
             self._tool_choice()
+        yield
         with ui.column().classes("full-width") as self._jogs_place:
             self._show_jogs()
+        yield
         with ui.element("div").classes("armtempo-slide"):
             ui.label(words.SPEED_OF_JOG).classes("text-caption")
             slider = ui.slider(min=1, max=100, value=page.jog_percent)
@@ -96,7 +103,7 @@ class MoveTab:
             low, high = joint.range_deg
             with ui.element("div").classes("armtempo-jog"):
                 self._pair(joint.name, JogMove(math.inf, joint=number))
-                ui.label("").classes("armtempo-number").props(f'id="armtempo-angle-{number + 1}"')
+                self._page.live_label(f"armtempo-angle-{number + 1}").classes("armtempo-number")
                 sign = joint.unit.sign
                 ui.label(f"{low:g}{sign} … {high:g}{sign}").classes("armtempo-note")
 
@@ -246,6 +253,6 @@ def _set_output(page: PanelPage, name: str, state: float | str, press: Press) ->
     return page.at_once(press, lambda board: board.output(name).set(state))
 
 
-def build(page: PanelPage) -> None:
-    """The tab."""
-    MoveTab(page)
+def build(page: PanelPage) -> Iterator[None]:
+    """The tab, with pauses."""
+    return MoveTab(page).parts()

@@ -9,6 +9,7 @@ window.armtempo = {
   changes: 0,
   since: 0,
   heard: performance.now(),
+  is_first: true, // nothing was heard yet
   offsets_ms: [], // of this page's clock to the server's, by the last messages of this connection
   OFFSETS: 50,
   state: 0, // the number of the state that is shown
@@ -28,6 +29,7 @@ window.armtempo = {
   THREE: null,
   SMOOTH_MS: 100,
   LOOK_MS: 100,
+  FIRST_MS: 10000, // in which a slow tablet has built the page
   SILENT_MS: 850, // with LOOK_MS and a busy browser within a second
 
   // the scene is there, some time after the page
@@ -37,14 +39,18 @@ window.armtempo = {
     setInterval(() => this.draw(), 50); // as often as the scene is drawn: at each frame it would cost twice as much
   },
 
-  begin(texts) {
-    this.texts = texts;
+  // the page is there, with what the server knew when it was asked for; nothing can be pressed until it is heard
+  wait(texts) {
     document.body.dataset.lost = texts.lost;
+    document.body.inert = true;
+    setInterval(() => this.look(), this.LOOK_MS);
+  },
+
+  begin() {
     const send = socket.emit.bind(socket);
     // Nothing is kept: socket.io would send it after a reconnection, when nobody means it any more
     socket.emit = (name, ...rest) => (name !== "event" || socket.connected ? send(name, ...rest) : socket);
     socket.on("disconnect", () => this.unconnected());
-    setInterval(() => this.look(), this.LOOK_MS);
     addEventListener("keydown", (event) => this.key(event), true); // before a button takes the space bar for itself
     addEventListener("keyup", (event) => event.key === "Enter" && this.release(), true);
     addEventListener("pointerdown", (event) => event.button === 0 && this.press(event), true);
@@ -57,6 +63,7 @@ window.armtempo = {
   // a message of the server, about ten a second
   hear(message) {
     this.heard = performance.now();
+    this.is_first = false;
     if (!socket.connected) return;
     this.state = message.state;
     this.offsets_ms = [...this.offsets_ms.slice(1 - this.OFFSETS), this.heard - 1000 * message.clock_s];
@@ -341,13 +348,12 @@ window.armtempo = {
 
   look() {
     if (this.held !== null) emitEvent("armtempo-held", this.stamp(this.held));
-    if (performance.now() - this.heard > this.SILENT_MS) {
+    if (performance.now() - this.heard > (this.is_first ? this.FIRST_MS : this.SILENT_MS)) {
       this.held = null;
       document.body.classList.add("lost");
     }
   },
 };
-document.body.inert = true; // until the server is heard: a press before would be lost in silence
 { // what the picture is drawn with, 0.8 MB, comes while the page is built
   const { imports } = JSON.parse(document.querySelector("script[type=importmap]").textContent);
   document.head.append(Object.assign(document.createElement("link"), { rel: "modulepreload", href: imports["nicegui-scene"] }));

@@ -1,4 +1,4 @@
-"""The panel's board: one command at a time, one client in control, states for all."""
+"""The panel's board: one command at a time, of the client that has control."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ from collections.abc import Callable, MutableSequence
 from enum import Flag, auto
 from functools import partial
 from pathlib import Path
-from threading import Event as ThreadEvent
 from threading import Lock, Thread
 
-from armtempo.basics.errors import ArmtempoError, InputError, LinkError, PortInUseError
+from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.deploy import deploy
 from armtempo.diagnosis.selftest.result import SelfTest
-from armtempo.link.traffic import Chunk, Sink
+from armtempo.link.traffic import Sink
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence_plan import SequencePlan
 from armtempo.panel import words
+from armtempo.panel.board_link import BoardLink
 from armtempo.panel.job_editor import JobEditor
-from armtempo.panel.live import Lines, LiveArm
 from armtempo.panel.press import Press, Presses
 from armtempo.panel.sequence_editor import SequenceEditor
 from armtempo.planning import brake_time
@@ -31,26 +30,9 @@ from armtempo.robot.goto import MovePace, Where, posture_deg
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.stop_request import Stopped, StopRequest
 
-LOOK_S = 0.25
-"""Interval of status requests while there are no samples."""
 FREEZE_AFTER_S = 0.5
 """An arm that is not at rest this long after a stop can be frozen: a double press of stop does not do it."""
 _LOG = logging.getLogger("armtempo")
-
-
-class _Warnings(logging.Handler):
-    """Shows the library's warnings on the pages, which a terminal shows too; not those on the panel's own server."""
-
-    def __init__(self, say: Callable[[str], None]) -> None:
-        super().__init__(logging.WARNING)
-        self._say = say
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Show a warning, in the terminal as well: Python does so only while no handler takes it."""
-        if logging.lastResort is not None and not logging.getLogger().handlers:
-            logging.lastResort.handle(record)
-        if not (text := record.getMessage()).startswith("panel:"):
-            self._say(text)
 
 
 class Needs(Flag):
@@ -75,7 +57,7 @@ class Needs(Flag):
     MOVE = IDLE | BOARD | REST
 
 
-class PanelBoard:
+class PanelBoard(BoardLink):
     """The panel's board. All methods are thread-safe.
 
     Commands run one at a time in separate threads; ``stop`` does not wait for them.
@@ -88,65 +70,33 @@ class PanelBoard:
         jobs: JobEditor,
         runs: Path,
     ) -> None:
-        """``connect`` opens the board's ``port``.
-
-        A board that does not answer, or runs another program, is ``trouble``: the panel can deploy the program.
-        Raises InputError or PortInUseError if the port cannot be used, LinkError for a board of another arm.
-        """
-        self.arm, self.jobs = jobs.arm, jobs
-        self.port, self.runs = port, runs
-        """Where run folders go."""
-        self.live = LiveArm(jobs.arm)
+        """``connect``, ``port``, errors: as those of the connection; ``runs``: where run folders go."""
+        # Before the connection, whose thread tells of the board's states
+        self.jobs, self.runs = jobs, runs
+        self.sequences = SequenceEditor(jobs.arm, jobs.folder)
         self.ended = 0
         """Number of ended commands."""
-        self.sequences = SequenceEditor(jobs.arm, jobs.folder)
         self.tested: SelfTest | None = None
         """The last self-test."""
-        self.traffic = Lines()
-        """Messages to and from the board, while ``monitors`` is not empty."""
-        self.monitors: set[str] = set()
-        """The clients that watch the traffic."""
-        self.trouble = ""
-        """Text: why the board cannot be reached."""
         self.busy = ""
         """Text: the running command."""
         self.progress = 0.0
         """Its progress, 0 to 1."""
-        self.log = Lines()
+        self.failure = ""
+        """Text: why the last command failed; "" after the next one has begun."""
+        self.guiding = False
+        """Whether the arm is guided by hand."""
         self.holder = ""
         """The client that has control; "" for none."""
         self.presses = Presses(self._situation)
         """Which presses of the pages are still meant."""
         self._lock = Lock()
-        self._closed = ThreadEvent()
-        self.failure = ""
-        """Text: why the last command failed; "" after the next one has begun."""
-        self.guiding = False
-        """Whether the arm is guided by hand."""
         self._stop = StopRequest()
         """Asks the running command for its end, also while it plans or stores before anything moves."""
         self._stop_s: float | None = None
         """When a stop was asked for, until the arm is known to rest."""
         self._stop_sent_s = 0.0
-        self._connect = connect
-        self._board: Board | None = None
-        self._warnings = _Warnings(self.say)
-        self._open()
-        _LOG.addHandler(self._warnings)
-        self._looker = Thread(target=self._look, name="armtempo panel states", daemon=True)
-        self._looker.start()
-
-    @property
-    def board(self) -> Board:
-        """The board; raises LinkError while there is none."""
-        if self._board is None:
-            raise LinkError(self.trouble or words.NO_BOARD, words.NO_BOARD_HINT)
-        return self._board
-
-    @property
-    def has_board(self) -> bool:
-        """Whether a board with the program answered."""
-        return self._board is not None
+        super().__init__(connect, port, jobs.arm)
 
     def arm_changed(self, arm: Arm, tool: str | None = None) -> None:
         """Take another version of the arm that differs in what the board does not know alone: its postures, workspace,
@@ -171,52 +121,11 @@ class PanelBoard:
         if self._board is not None:
             self._board.arm = self.arm
 
-    def _open(self) -> None:
-        try:
-            board = self._connect(self._take_traffic, self._tell)
-        except PortInUseError:
-            raise
-        except LinkError as error:
-            self.trouble = words.of_error(error)
-            self.say(self.trouble)
-            return
-        try:
-            board.configure(self.arm)
-        except BaseException:
-            board.close()
-            raise
-        board.client.session.listen(self.live.take_event)
-        self._board, self.trouble = board, ""
-
-    def _tell(self, text: str) -> None:
-        """Store a message about the connection as ``trouble``, until the board reports its state again."""
-        self.trouble = words.of_text(text)
-        self.say(text)
-
-    def without_board(self, call: Callable[[], object]) -> None:
-        """Close the port, run ``call``, which needs it, and open the board again."""
-        board, self._board = self._board, None
-        if board is not None:
-            board.close()
-        self.live.state = None  # after the last reader
-        try:
-            call()
-        finally:
-            try:
-                self._open()
-            except LinkError as error:
-                self.trouble = words.of_error(error)
-                raise
-
     def close(self) -> None:
         """Stop a motion, and close the board."""
-        self._closed.set()
-        _LOG.removeHandler(self._warnings)
         if self.busy:
             self.stop("the panel's end")
-        self._looker.join(2 * LOOK_S)
-        if self._board is not None:
-            self._board.close()
+        super().close()
 
     # control
 
@@ -397,6 +306,10 @@ class PanelBoard:
             self._fail(words.of_error(error))
         self._stop_sent_s = time.monotonic()
 
+    def _heard(self, asked_s: float) -> None:
+        if self.live.state and not self.live.state.moving and asked_s > self._stop_sent_s:
+            self._stop_s = None
+
     @property
     def can_freeze(self) -> bool:
         """Whether a stop was asked for, and the arm does not rest yet."""
@@ -415,34 +328,3 @@ class PanelBoard:
                 self.say(self.live.doubt)
         except ArmtempoError as error:
             self._fail(words.of_error(error))
-
-    def say(self, text: str) -> None:
-        """Append a line to the log."""
-        self.log.add([f"{time.strftime('%H:%M:%S')}  {words.of_text(text)}"])
-
-    # messages of the board
-
-    def _take_traffic(self, chunk: Chunk, frames: list[str]) -> None:
-        if self.monitors:
-            self.traffic.add([f"{chunk.time_s:9.3f} {chunk.direction} {frame}" for frame in frames])
-
-    def _look(self) -> None:
-        while not self._closed.wait(LOOK_S):
-            board = self._board
-            try:
-                self.live.draw()
-                if board is None:
-                    continue
-                with board.client.session.by_turns(LOOK_S) as mine:
-                    if not mine:
-                        continue
-                    asked_s = time.monotonic()
-                    self.live.ask(board)
-                    self.trouble = ""
-                    if self.live.state and not self.live.state.moving and asked_s > self._stop_sent_s:
-                        self._stop_s = None
-            except ArmtempoError as error:
-                if board is self._board:
-                    self.trouble = words.of_error(error)
-            except Exception:  # a bug: logged, and states continue
-                _LOG.exception("panel: the board's state")

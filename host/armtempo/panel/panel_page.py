@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
@@ -18,7 +18,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.model.arm import Arm
-from armtempo.panel import arm_scene, words
+from armtempo.panel import arm_scene, live_texts, words
 from armtempo.panel.arm_scene import ArmScene, ArmShape
 from armtempo.panel.hold import ButtonHold
 from armtempo.panel.panel_board import Needs, PanelBoard
@@ -93,12 +93,15 @@ class PanelPage:
     speeds: ui.label = field(init=False)
     """What the colours of the planned path mean."""
 
+    _texts: dict[str, str] = field(init=False)
+    """What the page says of the arm before its first message."""
     _playing: object = None
     """What is played on the model; another object for each time."""
 
     def __post_init__(self) -> None:
         """The controls are built for the arm as it is now."""
         self._arm = self.operator.arm
+        self._texts = live_texts.texts(self.operator)
 
     @cached_property
     def scene(self) -> ArmScene:
@@ -107,6 +110,12 @@ class PanelPage:
             scene = ArmScene(self.shape)
             ui.run_javascript(f"armtempo.show({scene.parts})")
         return scene
+
+    def live_label(self, place: str) -> ui.label:
+        """A place of ``live_texts``, with its text when the page was asked for."""
+        made = ui.label(self._texts[place])
+        made.props["id"] = place
+        return made
 
     def control(
         self,
@@ -215,9 +224,15 @@ class PanelPage:
 
     def build(self, tab: str, call: Callable[[], object]) -> None:
         """Build a part of a tab."""
+        for _ in self.parts(tab, call):
+            pass
+
+    def parts(self, tab: str, call: Callable[[], object]) -> Iterator[None]:
+        """Build a part of a tab; a call that gives an iterator builds with pauses, one for each item."""
         self.built = tab
         try:
-            call()
+            if isinstance(built := call(), Iterator):
+                yield from built
         finally:
             self.built = ""
 

@@ -33,6 +33,8 @@ _RECONNECT_S = 60.0
 _SWITCH_S = 0.0005
 """How long a thread that computes, such as a plan, keeps the interpreter from others that wait, a stop's among them:
 Python's own 5 ms count several times on the way of a press to the board."""
+_BUILD_S = 60.0
+"""Time for a page to be built, on a machine however busy."""
 _KEPT_MESSAGES = 2000
 """Messages kept for such a page: about 15 per second, for up to 132 s until it is dropped."""
 _NO_SCRIPTS = {"Content-Security-Policy": "sandbox"}
@@ -59,7 +61,7 @@ class Panel:
         self._api.get("/runs/{name}/{file}")(self._run_file)
         self._api.get(f"/runs/{COMPARISON}")(self._comparison)
         self._api.get("/mesh/{number}")(self._mesh)
-        ui.page("/")(self._page)
+        ui.page("/", response_timeout=_BUILD_S)(self._page)
         app.on_startup(self._tell)
         app.add_middleware(Policy)  # before what packs the pages
         ui.run_with(
@@ -86,11 +88,11 @@ class Panel:
         )
         uvicorn.Server(config).run(sockets=[listening])
 
-    def _page(self) -> None:
+    async def _page(self) -> None:
         client = ui.context.client
         self._new.add(client.id)
         self._offer_control(client.id)
-        layout.build(self._operator, self._hold, self._shape)
+        await layout.build(self._operator, self._hold, self._shape)
         client.on_connect(lambda: self._connected(client.id))
         client.on_disconnect(lambda: self._hold.lost(client.id))
         client.on_delete(lambda: self._gone(client.id))
@@ -101,6 +103,7 @@ class Panel:
         if client in self._new:
             self._new.discard(client)
             self._offer_control(client)
+            Client.instances[client].run_javascript(self._hear())
 
     def _offer_control(self, client: str) -> None:
         """Give control to a page that comes while no connected page has it."""
@@ -125,13 +128,17 @@ class Panel:
             if not any(client.has_socket_connection for client in Client.instances.values()):
                 continue
             try:
-                code = f"armtempo.hear({json.dumps(layout.message(self._operator, self._shape))})"
+                code = self._hear()
             except Exception:  # a bug: logged; the next message is sent; meanwhile the pages show an overlay
                 _LOG.exception("panel: the message to the pages")
                 continue
             for client in list(Client.instances.values()):
                 if client.has_socket_connection:
                     client.run_javascript(code)
+
+    def _hear(self) -> str:
+        """The message to a page, as its script takes it."""
+        return f"armtempo.hear({json.dumps(layout.message(self._operator, self._shape))})"
 
     async def _mesh(self, number: int) -> Any:
         """The mesh of a row of the arm, 0 for the base."""

@@ -19,7 +19,7 @@ def operator_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Cal
     """Makes operators of a board that only jogs this arm."""
     from tests.host.panel import fakes
 
-    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 1000.0)  # the board is never asked for its state
+    monkeypatch.setattr("armtempo.panel.board_link.LOOK_S", 1000.0)  # the board is never asked for its state
     with ExitStack() as ends:
 
         def of(arm: Arm) -> PanelBoard:

@@ -119,6 +119,12 @@ def _name(element: Any) -> str:
     return str(next((name for name in names if name), ""))
 
 
+async def built(client: Client, operator: PanelBoard) -> PanelPage:
+    """The page of a client, as the server builds it."""
+    with client:
+        return await layout.build(operator, ButtonHold(operator), ArmShape(operator.arm))
+
+
 @contextmanager
 def pages(operator: PanelBoard) -> Iterator[Page]:
     """A page of an operator, in control."""
@@ -129,8 +135,7 @@ def pages(operator: PanelBoard) -> Iterator[Page]:
     handle, core.app.handle_exception = core.app.handle_exception, errors.append  # type: ignore[method-assign]
     client = Client(PageOf("/"))
     try:
-        with client:
-            of = layout.build(operator, ButtonHold(operator), ArmShape(operator.arm))
+        of = loop.run_until_complete(built(client, operator))
         operator.take_control(client.id)
         made = Page(operator, client, of, loop)
         made.look()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import Any
 
@@ -46,3 +47,9 @@ def test_planned_curves_have_names_of_their_own(operator: PanelBoard) -> None:
     names = [one["name"] for one in series]
     assert names == [f"joint {n}" for n in (1, 2, 3)] + [f"joint {n}, planned" for n in (1, 2, 3)]
     assert {one["lineStyle"]["type"] for one in series[3:]} == {"dotted"}
+
+
+def test_a_curve_is_one_text_of_numbers(operator: PanelBoard) -> None:
+    """NiceGUI watches each item of a list, and the loop that stops the arm waits for thousands of them."""
+    series, _ = shown(operator, 50.0)
+    assert json.loads(series[0][":data"]) == [[time, 50.0] for time in range(5)]

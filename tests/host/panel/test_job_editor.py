@@ -11,8 +11,9 @@ from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.panel.job_editor import ANGLES, POSE, JobEditor, Via
+from armtempo.panel.job_editor import JobEditor
 from armtempo.panel.toml_blocks import TomlBlocks
+from armtempo.panel.via_rows import ANGLES, POSE, Via
 
 from tests.host import test_frames, test_tools
 

@@ -67,6 +67,19 @@ def test_what_is_being_typed_stays_when_another_field_changes(operator: PanelBoa
         assert operator.jobs.vias[2].angles_deg == pytest.approx(wanted)
 
 
+def test_a_page_without_control_changes_nothing_in_the_job(operator: PanelBoard) -> None:
+    with pages(operator) as page:
+        opened(page, POSES)
+        before = operator.jobs.text
+        operator.take_control("another page")
+        page.fire(page.named(words.NEW_VIA), "click", {})
+        type_into(page, "P2 joint 1", "7")
+        assert operator.jobs.text == before
+        operator.take_control(page.client.id)
+        page.fire(page.named(words.NEW_VIA), "click", {})
+        assert operator.jobs.text != before
+
+
 def test_no_page_waits_while_poses_are_searched_for(
     operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import time
 from types import SimpleNamespace
 from typing import Any
@@ -11,9 +12,11 @@ import pytest
 from armtempo.panel import layout, words
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.panel_board import FREEZE_AFTER_S, PanelBoard
+from nicegui import Client
+from nicegui.page import page as page_of
 
 from tests.host.panel.fakes import ARM, Clock, board_state, unhomed
-from tests.host.panel.pages import pages
+from tests.host.panel.pages import built, pages
 
 TABS = (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD)
 
@@ -125,3 +128,20 @@ def test_only_a_paused_motion_is_resumed(operator: PanelBoard) -> None:
             page.look()
             assert page.named(words.PAUSE).enabled  # also a second time
             assert page.named(words.RESUME).enabled == (percent == 0.0)
+
+
+def test_stops_of_other_pages_are_heard_while_a_page_is_built(operator: PanelBoard) -> None:
+    """The loop is held for less than half of the elements at a time."""
+    with pages(operator) as page:
+        client, counts = Client(page_of("/")), [0]
+
+        async def both() -> None:
+            making = asyncio.ensure_future(built(client, operator))
+            while not making.done():
+                counts.append(len(client.elements))
+                await asyncio.sleep(0)
+            counts.append(len(client.elements))
+
+        page.loop.run_until_complete(both())
+        client.delete()
+    assert max(after - before for before, after in itertools.pairwise(counts)) < counts[-1] / 2

@@ -11,14 +11,16 @@ import pytest
 from armtempo.kinematics.of_arm import forward
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model.tool import ArmTool
-from armtempo.panel import layout, problem
+from armtempo.panel import layout, live_texts, problem
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.live import LiveArm
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.panel.problem import Cure
+from nicegui import ui
 
 from tests.host import arms
 from tests.host.panel.fakes import ARM, Telling, board_state, unhomed
+from tests.host.panel.pages import pages
 
 
 def test_curves_that_are_read_stay_whole_when_a_run_begins() -> None:
@@ -62,21 +64,32 @@ def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: PanelBoa
     assert told["texts"]["armtempo-angle-2"] == "-60.00°"
 
 
+def test_a_page_that_was_not_told_anything_yet_says_where_the_arm_is(
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The script, the connection and the first message come up to a second after the page."""
+    monkeypatch.setattr(live_texts, "OLD_S", 1000.0)
+    operator.live.ask(Telling(board_state()))  # type: ignore[arg-type]
+    with pages(operator) as page:
+        places = {one.props.get("id"): one.text for one in page.elements(ui.label)}
+        assert live_texts.texts(operator).items() <= places.items()
+
+
 def test_a_state_that_is_old_says_how_old(operator: PanelBoard) -> None:
     operator.live.ask(Telling(board_state(state="moving", moving=True, speed_percent=20.0)))  # type: ignore[arg-type]
-    assert layout.state_line(operator) == "moving at 20 % · port"
+    assert live_texts.state_line(operator) == "moving at 20 % · port"
     operator.live.heard_s -= 3.0
-    assert re.fullmatch(r"moving at 20 % · last heard 3\.\d s ago · port", layout.state_line(operator))
+    assert re.fullmatch(r"moving at 20 % · last heard 3\.\d s ago · port", live_texts.state_line(operator))
 
 
 def test_a_pause_is_named_as_one(operator: PanelBoard) -> None:
     operator.live.state = board_state(state="moving", moving=True, speed_percent=0.0)
-    assert layout.state_line(operator).startswith("paused")
+    assert live_texts.state_line(operator).startswith("paused")
 
 
 def test_no_angle_is_minus_zero(operator: PanelBoard) -> None:
     operator.live.angles_deg = np.array([180.0, -38.0, -52.0])
-    assert "-0.0" not in layout.position(operator)
+    assert "-0.0" not in live_texts.position(operator)
 
 
 def test_outputs_and_inputs_are_those_of_the_board(tmp_path: Path) -> None:

@@ -144,7 +144,7 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
 def test_a_fault_of_ours_does_not_end_the_states(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("armtempo.panel.panel_board.LOOK_S", 0.01)
+    monkeypatch.setattr("armtempo.panel.board_link.LOOK_S", 0.01)
     asked: list[int] = []
     board = Board()
 

@@ -11,7 +11,7 @@ from armtempo.kinematics.of_arm import forward
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import BASE
-from armtempo.panel import layout, words
+from armtempo.panel import layout, live_texts, words
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.panel_board import PanelBoard
 from nicegui import ui
@@ -66,14 +66,14 @@ def choose(page: Page, tool: str) -> None:
 def test_the_chosen_tool_is_jogged_shown_and_used_for_poses_and_no_job_takes_it(operator: PanelBoard) -> None:
     here = operator.live.angles_deg
     with pages(operator) as page:
-        bare = layout.position(operator)
+        bare = live_texts.position(operator)
         choose(page, "pen")
         pen = operator.jobs.arm.with_tool("pen")
         assert operator.arm.tool == pen.tool
         assert operator.board.arm is operator.live.arm is operator.arm  # what is jogged, and goes to poses
         assert operator.jobs.arm.tool is operator.sequences.arm.tool is None  # they name their own
-        assert layout.position(operator) != bare
-        assert "x {:.1f}  y {:.1f}  z {:.1f} mm".format(*forward(pen, here)[:3, 3]) in layout.position(
+        assert live_texts.position(operator) != bare
+        assert "x {:.1f}  y {:.1f}  z {:.1f} mm".format(*forward(pen, here)[:3, 3]) in live_texts.position(
             operator
         )
         operator.busy = words.JOG

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tests.system import page_checks, panels
-from tests.system.panel.files import TABS, show
+from tests.system.panel.files import TABS, show, undo_all
 from tests.system.panels import Panel, home, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("panel")]
@@ -64,6 +64,10 @@ def test_a_page_that_hears_nothing_covers_itself_within_a_second(page: Any) -> N
     }"""
     assert page.evaluate(silent, 1000 - page.evaluate("armtempo.LOOK_MS"))
     page.wait_for_selector("body:not(.lost)")  # it hears again
+    first = "ms => { armtempo.is_first = true; return (" + silent + ")(ms); }"  # a page that never connects
+    assert not page.evaluate(first, page.evaluate("armtempo.FIRST_MS") - 5000)
+    assert page.evaluate(first, page.evaluate("armtempo.FIRST_MS") + 1)
+    page.wait_for_selector("body:not(.lost)")
     keys = """() => {
       const sent = [], emit = window.emitEvent;
       window.emitEvent = (name) => sent.push(name);
@@ -124,7 +128,7 @@ _FOCUS = """async () => {
 
 
 def test_each_tab_is_in_view_readable_and_for_the_keyboard(page: Any) -> None:
-    """On a desktop, a tablet and a phone, below a banner; in the dark the colours alone are others."""
+    """On desktops, a tablet and a phone, below a banner; in the dark the colours alone are others, at any size."""
     home(page)
     show(page, "Board")
     panels.press(page, page.get_by_role("button", name="Flash", exact=True))
@@ -136,6 +140,9 @@ def test_each_tab_is_in_view_readable_and_for_the_keyboard(page: Any) -> None:
         for tab in TABS:
             show(page, tab)
             page.wait_for_selector(f".q-tab--active:has-text('{tab}')")
+            if (tab, scheme) == ("Job", "light"):  # a row with its fields, one of them with a value
+                page.get_by_label("Line, arc, stop, speed: P1").click()
+                page.get_by_label("P1: Tool speed, mm/s").fill("40")
             page.keyboard.press("Tab")  # the focus shows if the last key was one of the keyboard
             assert scheme == "dark" or page.evaluate(_FOCUS) == []
             for width, height in views:
@@ -147,6 +154,8 @@ def test_each_tab_is_in_view_readable_and_for_the_keyboard(page: Any) -> None:
                 assert found == [], (scheme, tab, width)
     page.emulate_media(color_scheme="light")
     page.set_viewport_size(panels.SMALL)
+    show(page, "Job")
+    undo_all(page)
     page.get_by_role("button", name="Close", exact=True).click()
     page.locator(".armtempo-banner").wait_for(state="hidden")
 
