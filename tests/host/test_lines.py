@@ -242,6 +242,16 @@ def test_arcs_that_their_points_do_not_define_are_refused(
         tool_path.arc(np.eye(4), through, there, np.zeros(3), "P0 to P1", 0.5)
 
 
+@pytest.mark.parametrize("aside", [1e-7, 1e-4, 5e-3])
+def test_circles_through_points_nearly_on_a_line_are_refused(aside: float) -> None:
+    points = ((20.0, aside, 0.0), (40.0, 0.0, 0.0))
+    with pytest.raises(PlanError, match=r"circle_through_mm do not define a circle within 0\.5 mm"):
+        tool_path.full_circle(np.eye(4), points, np.eye(4), np.zeros(3), "P0 to P1", 0.5)
+    round_ones = ((20.0, 20.0, 0.0), (40.0, 0.0, 0.0))
+    circle = tool_path.full_circle(np.eye(4), round_ones, np.eye(4), np.zeros(3), "", 0.5)
+    assert circle.length == pytest.approx(40.0 * np.pi)
+
+
 def test_ordinary_arcs_are_defined() -> None:
     rng = np.random.default_rng(41)
     for _ in range(200):

@@ -15,7 +15,14 @@ import numpy as np
 
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, MissingPackageError
-from armtempo.new_arm import urdf_bodies, urdf_limits, urdf_refusals, urdf_tip, urdf_transmissions
+from armtempo.new_arm import (
+    urdf_bodies,
+    urdf_limits,
+    urdf_numbers,
+    urdf_refusals,
+    urdf_tip,
+    urdf_transmissions,
+)
 from armtempo.new_arm.urdf_chain import MM, Chain, ChainJoint, transform
 from armtempo.new_arm.urdf_refusals import SLIDING
 
@@ -111,6 +118,7 @@ def _checked(path: Path) -> ElementTree.Element:
             f"{path}: is a xacro file{left}",
             f"make a URDF of it first: xacro {path} > robot.urdf (xacro is a part of ROS)",
         )
+    urdf_numbers.check(path, root)
     return root
 
 

@@ -46,6 +46,11 @@ REFUSED = [
     ),
     ("is_not_there", [], ["no such file"]),
     ("light", [], ["joint 'j3': a mass"]),
+    ("unit", [], ["joint 'j2': <limit> upper='2.0rad' is not a number"]),
+    ("nowhere", [], ["joint 'j1': <origin> xyz='0 0 nan' is not finite"]),
+    ("flat", [], ["joint 'j1': <axis> xyz='0 1' is not 3 numbers"]),
+    ("backwards", [], ["joint 'j2': <limit> velocity='-1.5' is below 0"]),
+    ("massless", [], ["link 'tool': <mass> value='nan' is not finite"]),
     ("long", [], ["joint[1].a_mm = 2500000.0 is not allowed"]),
 ]
 
@@ -57,6 +62,13 @@ SPOILED = {
     "optenv": lambda text: text.replace('"0 0 0.08"', '"$(optenv LENGTH 0.3) 0 0"'),
     "light": lambda text: text.replace(
         TOOL, TOOL.replace("/>", ">") + '<inertial><mass value="-1"/></inertial></link>'
+    ),
+    "unit": lambda text: text.replace(J2_LIMIT, J2_LIMIT.replace('"2.0"', '"2.0rad"')),
+    "nowhere": lambda text: text.replace('"0 0 0.08"', '"0 0 nan"'),
+    "flat": lambda text: text.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 1"/>'),
+    "backwards": lambda text: text.replace(J2_LIMIT, J2_LIMIT.replace('"1.5"', '"-1.5"')),
+    "massless": lambda text: text.replace(
+        TOOL, TOOL.replace("/>", ">") + '<inertial><mass value="nan"/></inertial></link>'
     ),
     "long": lambda text: text.replace("0.25 0 0.02", "2500 0 0"),
     "xacro": lambda text: text.replace("<link", '<xacro:property name="a" value="1"/>\n  <link', 1).replace(

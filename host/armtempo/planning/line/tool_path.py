@@ -173,7 +173,7 @@ def full_circle(
         )
     first, second = (np.array(point) - start[:3, 3] for point in through)
     circle = _circle(first, second)
-    if circle is None or _unsure_mm(circle, first, second) > tolerance_mm:
+    if circle is None or _unsure_mm(circle, first, second, True) > tolerance_mm:
         raise PlanError(
             f"{where}: the start and circle_through_mm do not define a circle within {tolerance_mm:g} mm: on one line, "
             "or two of them nearly the same",
@@ -216,16 +216,17 @@ def _circle(middle: Array, last: Array) -> _Circle | None:
     return _Circle(centre, np.cross(normal, -centre) / (size * np.linalg.norm(centre)))
 
 
-def _unsure_mm(circle: _Circle, middle: Array, last: Array) -> float:
-    """How far the arc moves, to first order, if each of its points is off by _ROUNDED_MM."""
-    own = circle.points(circle.angle_to(last))
+def _unsure_mm(circle: _Circle, middle: Array, last: Array, whole: bool = False) -> float:
+    """How far the arc, or the ``whole`` circle, moves, to first order, if each of its points is off by _ROUNDED_MM."""
+    own = circle.points(2.0 * np.pi if whole else circle.angle_to(last))
     total = 0.0
     for offset in _ROUNDED_MM * np.eye(3):
         for other in (_circle(middle + offset, last), _circle(middle, last + offset)):
             if other is None:
                 return np.inf
             end = last if other.angle_to(last) else last + offset
-            total += float(np.abs(other.points(other.angle_to(end)) - own).max())
+            angle = 2.0 * np.pi if whole else other.angle_to(end)
+            total += float(np.abs(other.points(angle) - own).max())
     return total
 
 
