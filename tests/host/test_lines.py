@@ -22,7 +22,7 @@ from armtempo.planning import planner
 from armtempo.planning.fixed_path import FixedPath
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import deviation, line_path, tool_path
-from armtempo.planning.line.deviation import LineDeviation, halved
+from armtempo.planning.line.deviation import LineDeviation, SplinePieces, halved
 from armtempo.planning.line.follow import Course, follow, passed
 from armtempo.planning.line.tool_path import ToolPath
 from armtempo.robot import goto
@@ -145,8 +145,9 @@ def test_the_bound_holds_and_is_sharp() -> None:
         angles = bspline.fit(led.followed.at(led.distances(8)), 5)
         angles = angles + size * rng.uniform(-1, 1, angles.shape)
         ways = bspline.fit(led.distances(8), 5)
-        splines = of_path(angles, 5), of_path(ways[:, None], 5)[:, :, 0]
-        found = deviation.proven(*splines, tool, course.path, course.fixed, LineDeviation(0.5, 0.5))
+        pieces = SplinePieces(of_path(angles, 5), of_path(ways[:, None], 5)[:, :, 0])
+        arguments = pieces, tool, course.path, course.fixed
+        found = deviation.proven(*arguments, LineDeviation(0.5, 0.5))
         u = np.linspace(0.0, 1.0, 201)
         powers = u[:, None] ** np.arange(6)
         dense = np.einsum("up,spj->suj", powers, bspline.polynomials(angles, 5)).reshape(-1, 6)
@@ -158,7 +159,6 @@ def test_the_bound_holds_and_is_sharp() -> None:
         turned = np.degrees(np.arccos(np.clip(cosine.min(), -1.0, 1.0)))
         assert away <= found.position_mm <= 1.05 * away + 0.02, f"seed {seed}, {size}"
         assert turned <= found.rotation_deg <= 1.05 * turned + 0.05, f"seed {seed}, {size}"
-        arguments = *splines, tool, course.path, course.fixed
         work = [whether(arguments, part * np.array(found)) for part in (0.3, 0.97, 1.03, 2.0, 5.0)]
         assert np.sum(work, axis=0)[1] < np.sum(work, axis=0)[0], f"seed {seed}, {size}"
 

@@ -54,7 +54,7 @@ def test_a_spline_passes_them_as_one_and_says_so() -> None:
     ],
 )
 def test_which_are_one(via: tuple[tuple[float, ...], ...], groups: list[list[int]]) -> None:
-    job, notes = near_points.merged(ARM, Job("some", via=via), np.array(via))
+    job, _, notes = near_points.merged(ARM, Job("some", via=via), np.array(via))
     last = len(via) - 1
     assert job.via == tuple(via[last if last in group else group[0]] for group in groups)
     assert len(notes) == sum(len(group) > 1 for group in groups)
@@ -63,21 +63,21 @@ def test_which_are_one(via: tuple[tuple[float, ...], ...], groups: list[list[int
 def test_no_other_job_is_changed() -> None:
     job = Job.paper()
     via, _ = planner.via_angles(ARM, job)
-    assert near_points.merged(ARM, job, via)[0] is job
+    assert near_points.merged(ARM, job, via).job is job
 
 
 def test_stops_stay_and_rests_add_up() -> None:
     via = (HERE, THERE, beside(THERE), END, HERE)
     job = Job("rests", via=via, stops=(Stop(1, 0.5), Stop(2, 0.25), Stop(3)))
-    found, notes = near_points.merged(ARM, job, np.array(via))
+    found, _, notes = near_points.merged(ARM, job, np.array(via))
     assert found.stops == (Stop(1, 0.75), Stop(2))
     assert "with 0.75 s of rest" in notes[0]
-    assert near_points.merged(ARM, replace(job, stops=(Stop(2),)), np.array(via))[0].stops == (Stop(1),)
+    assert near_points.merged(ARM, replace(job, stops=(Stop(2),)), np.array(via)).job.stops == (Stop(1),)
 
 
 def test_a_stop_at_an_end_is_not_lost() -> None:
     via = (HERE, beside(HERE), END)
-    assert not near_points.merged(ARM, Job("ends", via=via, stops=(Stop(1),)), np.array(via))[0].stops
+    assert not near_points.merged(ARM, Job("ends", via=via, stops=(Stop(1),)), np.array(via)).job.stops
     with pytest.raises(InputError, match="so they are one point, but the dwell_s of P1 is not at an end"):
         near_points.merged(ARM, Job("ends", via=via, stops=(Stop(1, 1.0),)), np.array(via))
     back = via[::-1]
@@ -109,7 +109,7 @@ def test_what_is_asked_of_the_tool_stays(
         with pytest.raises(InputError, match=message):
             near_points.merged(ARM, job, np.array(via))
         return
-    found, _ = near_points.merged(ARM, job, np.array(via))
+    found = near_points.merged(ARM, job, np.array(via)).job
     assert found.tool_segments == (ToolSegment(1, **before), ToolSegment(2, line=True))  # type: ignore[arg-type]
 
 
@@ -121,7 +121,7 @@ def test_circles_and_wide_poses_are_no_such_points() -> None:
     pose = Pose(matrix=tuple(map(tuple, np.eye(4).tolist())), tolerance_mm=5.0, tolerance_deg=5.0)
     wide = Job("wide", via=(HERE, pose, beside(THERE), END))
     assert near_points.merged(ARM, wide, np.array(via))[0] is wide
-    assert len(near_points.merged(ARM, replace(wide, path="through"), np.array(via))[0].via) == 3
+    assert len(near_points.merged(ARM, replace(wide, path="through"), np.array(via)).job.via) == 3
 
 
 def test_a_job_is_split_at_its_merged_stops() -> None:
@@ -143,4 +143,4 @@ def test_a_recording_that_creeps_is_thinned_to_points_that_stay(tmp_path: Path) 
     np.savetxt(file, table, delimiter=",", header="time_s,joint 1,joint 2,joint 3", comments="", fmt="%.6f")
     job = Job.from_csv(file, ARM, tolerance_deg=0.02)
     via, _ = planner.via_angles(ARM, job)
-    assert near_points.merged(ARM, job, via)[0] is job
+    assert near_points.merged(ARM, job, via).job is job

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
@@ -17,8 +18,18 @@ from armtempo.planning import checks
 _KEYS = ("blend_mm", "speed_mm_s", "acceleration_mm_s2")
 
 
-def merged(arm: Arm, job: Job, via_deg: Array) -> tuple[Job, tuple[str, ...]]:
-    """The job with via points as one that are less than a step of each motor apart, and a note for each such point.
+class Merged(NamedTuple):
+    """A job without via points less than a step apart."""
+
+    job: Job
+    kept: list[int]
+    """Of its via points, their numbers in the other job."""
+    notes: tuple[str, ...]
+    """One for each point that was several."""
+
+
+def merged(arm: Arm, job: Job, via_deg: Array) -> Merged:
+    """The job with via points as one that are less than a step of each motor apart.
 
     ``via_deg``: (n + 1, J), the angles at the via points. The first point of a group stays, or the motion's last; the
     two ends are never one. Stops stay, and their dwells add up; what is asked of the tool between points that become
@@ -26,8 +37,9 @@ def merged(arm: Arm, job: Job, via_deg: Array) -> tuple[Job, tuple[str, ...]]:
     """
     groups = point_groups.groups(arm.transmission.steps(via_deg), partial(_may_join, job))
     if len(groups) == len(job.via):
-        return job, ()
+        return Merged(job, list(range(len(job.via))), ())
     last = len(job.via) - 1
+    kept = [point_groups.kept(group, last) for group in groups]
     segments = []
     stops = []
     notes = []
@@ -45,14 +57,15 @@ def merged(arm: Arm, job: Job, via_deg: Array) -> tuple[Job, tuple[str, ...]]:
             stops.append(Stop(number, rest_s))
         if len(group) > 1:
             rests = f", with {rest_s:g} s of rest" if rest_s else ""
-            place = via_deg[point_groups.kept(group, last)].tolist()
+            place = via_deg[kept[number]].tolist()
             where = arm.texts.listed(f"{round(angle, 4) + 0.0:g}" for angle in place)
             notes.append(
                 f"{_named(group)} are less than a step apart, and planned as one point, P{number} at {where}{rests}; "
                 "later via points count from it"
             )
-    via = tuple(job.via[point_groups.kept(group, last)] for group in groups)
-    return replace(job, via=via, stops=tuple(stops), tool_segments=tuple(segments)), tuple(notes)
+    via = tuple(job.via[number] for number in kept)
+    found = replace(job, via=via, stops=tuple(stops), tool_segments=tuple(segments))
+    return Merged(found, kept, tuple(notes))
 
 
 def _may_join(job: Job, before: int, number: int) -> bool:

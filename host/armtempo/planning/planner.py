@@ -105,9 +105,12 @@ class PlannedPoints(NamedTuple):
 def points_of(arm: Arm, job: Job) -> PlannedPoints:
     """The job and the angles that are planned; errors as in ``near_points.merged`` and ``via_angles``."""
     via, notes = via_angles(arm, job)
-    job, told = near_points.merged(arm, job, via)
+    job, kept, told = near_points.merged(arm, job, via)
     if told:
-        via, notes = via_angles(arm, job)
+        via = via[
+            kept
+        ]  # not those of the other job: a pose is solved from the point before, which may be gone
+        notes = via_angles(arm, job)[1]
     return PlannedPoints(job, via, (*told, *notes))
 
 

@@ -23,7 +23,7 @@ from armtempo.model.joint_unit import SLIDE_MM
 from armtempo.model.parts import DrivenJoint
 from armtempo.model.tool_pose import APPROACH, BASE, PITCH, ROLL, WHOLE, YAW, Pose
 from armtempo.planning.free.angle_bounds import of_path
-from armtempo.planning.line.deviation import LineDeviation, proven
+from armtempo.planning.line.deviation import LineDeviation, SplinePieces, proven
 from armtempo.planning.line.tool_path import ToolPath, ToolPiece, rotations
 from armtempo.planning.move_law import DEGREE
 from armtempo.planning.tool import Tool
@@ -286,12 +286,10 @@ class FollowedLine:
         direction = np.zeros(3) if line.about else line.direction
         piece = ToolPiece(line._pose, self.length, direction, np.zeros(3), turn)
         tool = Tool(line.arm, list(range(len(line.arm.driven))), line.start_deg)
-        angles, distances = (
-            of_path(angle_points_deg, DEGREE),
-            of_path(distance_points[:, None], DEGREE)[:, :, 0],
-        )
+        distances = of_path(distance_points[:, None], DEGREE)[:, :, 0]
+        pieces = SplinePieces(of_path(angle_points_deg, DEGREE), distances)
         most = LineDeviation(STRAY_MM, STRAY_DEG)
-        found = proven(angles, distances, tool, ToolPath((piece,)), fixed, most, whether=True)
+        found = proven(pieces, tool, ToolPath((piece,)), fixed, most, whether=True)
         return found.position_mm <= STRAY_MM and found.rotation_deg <= STRAY_DEG
 
 

@@ -30,6 +30,15 @@ class LineDeviation(NamedTuple):
     rotation_deg: float
 
 
+class SplinePieces(NamedTuple):
+    """Bernstein coefficients of a spline's pieces."""
+
+    angles_deg: Array
+    """(S, 6, J)."""
+    distances: Array
+    """(S, 6)."""
+
+
 class _Bends(NamedTuple):
     """Bounds of second derivatives over pieces, each (N,): of the position in mm, of the rotation's matrix."""
 
@@ -38,8 +47,7 @@ class _Bends(NamedTuple):
 
 
 def proven(
-    angles_deg: Array,
-    distances: Array,
+    pieces: SplinePieces,
     tool: Tool,
     path: ToolPath,
     fixed: tuple[str, ...],
@@ -48,9 +56,10 @@ def proven(
 ) -> LineDeviation:
     """Bounds on the deviation of a spline from its path.
 
-    ``angles_deg``: Bernstein coefficients (S, 6, J), ``distances``: (S, 6). Found to 2 %, or to that part of
-    ``enough``; with ``whether`` only until it is known whether that is more than ``enough``.
+    Found to 2 %, or to that part of ``enough``; with ``whether`` only until it is known whether that is more than
+    ``enough``.
     """
+    angles_deg, distances = pieces
     bounds = path.bounds
     floor = np.array([enough.position_mm, _chord(enough.rotation_deg)]) * _SHARP
     counts = np.array([1.0, 1.0 if fixed else 0.0])

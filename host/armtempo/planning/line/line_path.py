@@ -19,7 +19,7 @@ from armtempo.planning import board_limits, checks
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import legs as cut
 from armtempo.planning.line.between import Between
-from armtempo.planning.line.deviation import LineDeviation, proven
+from armtempo.planning.line.deviation import LineDeviation, SplinePieces, proven
 from armtempo.planning.line.dwell import DWELL_SEGMENTS
 from armtempo.planning.line.follow import Followed, follow
 from armtempo.planning.line.legs import Leg
@@ -77,7 +77,8 @@ class LinePath:
         angles = of_path(self.angle_points_deg, DEGREE)[first:last]
         distances = of_path(self.distance_points[:, None], DEGREE)[first:last, :, 0]
         course, tool = led.followed.course, led.followed.tool
-        return proven(angles, distances - distances[0, 0], tool, course.path, course.fixed, led.leg.enough)
+        pieces = SplinePieces(angles, distances - distances[0, 0])
+        return proven(pieces, tool, course.path, course.fixed, led.leg.enough)
 
 
 def led_legs(arm: Arm, job: Job, via_deg: Array) -> dict[int, Led]:
