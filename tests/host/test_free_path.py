@@ -58,7 +58,11 @@ def test_random_jobs_keep_their_limits_and_pass_their_via_points(seed: int) -> N
     arm, job = problems.random_free_problem(seed)
     if np.all(np.ptp(job.via, axis=0) == 0):
         return
-    plan = planner.plan(arm, job)
+    try:
+        plan = planner.plan(arm, job)
+    except InputError as refused:
+        assert "less than a step apart" in str(refused), f"seed {seed}"  # a dwell where that makes an end of them
+        return
     assert faults(plan) == [], f"seed {seed}"
     for search in plan.searches:
         assert search.lower_bound_s <= search.total_s, f"seed {seed}"

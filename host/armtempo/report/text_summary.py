@@ -52,7 +52,7 @@ def lines(plan: Plan, verbose: bool = False) -> list[str]:
     text += aligned([row[:1] + row[3:] for row in rows] if plan.trajectory.shared else rows, _widths(plan))
     text += _faster(plan)
     if job.timing == "per-joint" and len(plan.searches) > 1:
-        text.extend(_separation(plan))
+        text.extend(_separation(plan, verbose))
     text.extend(f"note: {note}" for note in plan.notes)
     text.extend(torque_lines([(plan.holding, plan.trajectory)]))
     text.extend(
@@ -133,7 +133,7 @@ def _settings(plan: Plan, verbose: bool) -> list[str]:
         search = f"{job.optimiser}, {job.population} x {job.iterations}"
         if job.optimiser == GRADIENT:
             search = f"{job.optimiser}, {job.starts} starts"
-        path = "spline through the via points"
+        path = "through the via points"
         more = [f"degree {job.degree}", f"refine {first.refine}{auto}", search, f"seed {job.seed}"]
     return [path, f"{job.timing} timing", *(more if verbose else ())]
 
@@ -198,14 +198,15 @@ def _free_s(plan: Plan) -> float:
     return found.trajectory.duration_s
 
 
-def _separation(plan: Plan) -> list[str]:
-    """For per-joint timing: differences of the joints' times at the via points, and the tool's deviation."""
-    spread = ", ".join(f"{value:.2f}" for value in path_deviation.via_spread_s(plan.trajectory))
-    apart = f"time from the first to the last joint at each via point: {spread} s"
-    if checks.is_free(plan.job):
-        return [apart]
-    stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
-    return [apart, f'so the tool strays up to {stray:.1f} mm from its path; timing = "shared" keeps it there']
+def _separation(plan: Plan, verbose: bool) -> list[str]:
+    """For per-joint timing: how far apart the joints pass a via point, and the tool's deviation."""
+    times_s = path_deviation.via_spread_s(plan.trajectory)
+    text = f"the joints pass a via point up to {max(times_s):.2f} s apart"
+    if not checks.is_free(plan.job):
+        stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
+        text += f', so the tool strays up to {stray:.1f} mm from its path; timing = "shared" keeps it there'
+    each = ", ".join(f"{value:.2f}" for value in times_s)
+    return [text, f"time from the first to the last joint at each via point: {each} s"] if verbose else [text]
 
 
 _QUANTITIES = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
