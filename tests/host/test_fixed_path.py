@@ -191,7 +191,7 @@ def test_a_search_that_no_bound_holds_back_is_made_once(monkeypatch: pytest.Monk
 @pytest.mark.slow
 def test_bounds_that_hold_the_search_back_are_widened_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
     via, _ = uneven()
-    arm = problems.make_arm([[50.0, 50.0, 150.0]])
+    arm = problems.make_arm([[50.0, 50.0, 150.0]], microsteps=256)  # so 0.01 degrees are more than a step
     job = Job("uneven", tuple(map(tuple, via.tolist())), refine=1, path="through")
     best = planner.plan(arm, job).total_s
     given = planner.plan(arm, replace(job, bounds_s=(20.0, 21.0), polish=False))
@@ -206,7 +206,7 @@ def test_bounds_that_hold_the_search_back_are_widened_and_named(monkeypatch: pyt
 @pytest.mark.slow
 def test_gradients_start_within_bounds_and_are_not_held_by_them() -> None:
     via, _ = uneven()
-    arm = problems.make_arm([[50.0, 50.0, 150.0]])
+    arm = problems.make_arm([[50.0, 50.0, 150.0]], microsteps=256)  # so 0.01 degrees are more than a step
     job = Job("uneven", tuple(map(tuple, via.tolist())), refine=1, optimiser="gradient", path="through")
     plan = planner.plan(arm, replace(job, bounds_s=(20.0, 21.0)))
     assert not any("bounds_s" in note for note in plan.notes)

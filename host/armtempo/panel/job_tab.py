@@ -176,7 +176,7 @@ class JobTab:
 
         def change() -> None:
             if reason := self._operator.why_not(self._page.client, Needs.CONTROL):
-                raise InputError(reason)
+                raise InputError(reason, words.WAIT)
             call(*arguments)
 
         self._page.attempt(change)

@@ -196,9 +196,10 @@ def test_each_button_is_pressed_once(page: Any, panel: Panel) -> None:
             pressed.add(name)
             button.dispatch_event("click")  # notifications may cover it
             page.wait_for_timeout(100)
-            for dialog in reversed(page.get_by_role("dialog").all()):  # on a busy machine one may come late
-                dialog.get_by_role("button", name="Cancel").dispatch_event("click")
-                dialog.wait_for(state="detached")
+            while page.get_by_role("dialog").count():  # on a busy machine one may come late
+                dialog = page.get_by_role("dialog").last.element_handle()
+                dialog.query_selector("button:has-text('Cancel')").dispatch_event("click")
+                page.wait_for_function("dialog => !dialog.isConnected", arg=dialog)
             if page.locator(".q-menu").count():
                 page.keyboard.press("Escape")
             if "moving" in page.inner_text("#armtempo-state"):
