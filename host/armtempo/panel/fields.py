@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from armtempo.basics.errors import InputError
+from armtempo.panel import words
 
 
 @dataclass
@@ -37,6 +38,15 @@ class Fields:
             if (now := field.value()) != field.shown:
                 field.shown = now
                 field.show(now)
+
+
+@contextmanager
+def of_a_row() -> Iterator[None]:
+    """A context that uses a row by its number: InputError if a press just before has removed it."""
+    try:
+        yield
+    except IndexError:
+        raise InputError(words.ROW_GONE, words.LOOK_AGAIN) from None
 
 
 @contextmanager

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from nicegui import ui
 
+from armtempo.basics.errors import InputError
 from armtempo.panel import words
-from armtempo.panel.fields import in_words
+from armtempo.panel.fields import in_words, of_a_row
 from armtempo.panel.file_editor import FileEditor
 from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import named
@@ -48,8 +49,19 @@ class FileRow:
         self._page.operator.check(self._page.client, press, Needs.CONTROL)
         self._call(call, *given)
 
+    def type_in(self, call: Callable[..., object], *arguments: Any) -> None:
+        """Change what is edited by what was typed, if this page has control; an error is shown."""
+
+        def change() -> None:
+            if reason := self._page.operator.why_not(self._page.client, Needs.CONTROL):
+                raise InputError(reason, words.WAIT)
+            with of_a_row():
+                call(*arguments)
+
+        self._page.attempt(change)
+
     def _call(self, call: Callable[..., T], *arguments: Any) -> T:
-        with in_words(self._of):
+        with in_words(self._of), of_a_row():
             return call(*arguments)
 
     def _why_nothing(self) -> str:

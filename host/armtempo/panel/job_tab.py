@@ -10,7 +10,6 @@ import numpy as np
 from nicegui import background_tasks, run, ui
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.kinematics.solver import moved_tool_deg
 from armtempo.model import via_table
@@ -20,7 +19,6 @@ from armtempo.panel.fields import Fields
 from armtempo.panel.file_row import FileRow
 from armtempo.panel.job_editor import OPTIONS
 from armtempo.panel.job_plan import JobPlan
-from armtempo.panel.panel_board import Needs
 from armtempo.panel.panel_page import build_rows, named
 from armtempo.panel.via_rows import ANGLES, POSE, WAY_KEYS, Via
 
@@ -172,14 +170,8 @@ class JobTab:
         self._edit(call, *given, str(event.args or "").strip())
 
     def _edit(self, call: Callable[..., object], *arguments: Any) -> None:
-        """Change the job, if this page has control."""
-
-        def change() -> None:
-            if reason := self._operator.why_not(self._page.client, Needs.CONTROL):
-                raise InputError(reason, words.WAIT)
-            call(*arguments)
-
-        self._page.attempt(change)
+        """Change the job, and show it at once."""
+        self._file.type_in(call, *arguments)
         self._look()
 
     def _take_posture(self) -> None:

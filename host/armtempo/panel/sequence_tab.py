@@ -107,7 +107,7 @@ class SequenceTab:
             ui.label(str(index + 1)).classes("armtempo-number")
             choice = ui.select(words.STEP_KINDS, value=kind).props("dense outlined")
             named(choice, f"{words.STEP} {index + 1}")
-            choice.on_value_change(lambda event: editor.set_kind(index, str(event.value)))
+            choice.on_value_change(lambda event: self._set_kind(index, kind, str(event.value)))
             page.control(choice, Needs.CONTROL)
             for key in (kind, *KINDS[kind]):
                 label = None if key == kind else words.STEP_KEYS[key]
@@ -137,9 +137,13 @@ class SequenceTab:
         self._page.control(box, Needs.CONTROL)
         return box
 
+    def _set_kind(self, index: int, shown: str, kind: str) -> None:
+        if kind != shown:
+            self._file.type_in(self._editor.set_kind, index, kind)
+
     def _set(self, index: int, key: str, text: str) -> None:
         """Set a value, and show how the file has it at once: later it would replace what is typed next."""
-        self._page.attempt(lambda: self._editor.set(index, key, text))
+        self._file.type_in(self._editor.set, index, key, text)
         self._look()
 
     def _look(self) -> None:

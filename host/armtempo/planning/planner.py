@@ -107,9 +107,7 @@ def points_of(arm: Arm, job: Job) -> PlannedPoints:
     via, notes = via_angles(arm, job)
     job, kept, told = near_points.merged(arm, job, via)
     if told:
-        via = via[
-            kept
-        ]  # not those of the other job: a pose is solved from the point before, which may be gone
+        via = via[kept]  # as a pose is solved from the point before, which may be gone from the job
         notes = via_angles(arm, job)[1]
     return PlannedPoints(job, via, (*told, *notes))
 

@@ -201,12 +201,14 @@ def _free_s(plan: Plan) -> float:
 def _separation(plan: Plan, verbose: bool) -> list[str]:
     """For per-joint timing: how far apart the joints pass a via point, and the tool's deviation."""
     times_s = path_deviation.via_spread_s(plan.trajectory)
-    text = f"the joints pass a via point up to {max(times_s):.2f} s apart"
+    text = [f"the joints pass a via point up to {max(times_s):.2f} s apart"]
+    if verbose:
+        each = ", ".join(f"{value:.2f}" for value in times_s)
+        text = [f"time from the first to the last joint at each via point: {each} s"]
     if not checks.is_free(plan.job):
         stray = path_deviation.tool_stray_mm(plan.arm, plan.trajectory)
-        text += f', so the tool strays up to {stray:.1f} mm from its path; timing = "shared" keeps it there'
-    each = ", ".join(f"{value:.2f}" for value in times_s)
-    return [text, f"time from the first to the last joint at each via point: {each} s"] if verbose else [text]
+        text.append(f'the tool strays up to {stray:.1f} mm from its path; timing = "shared" avoids that')
+    return text
 
 
 _QUANTITIES = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")

@@ -12,7 +12,7 @@ from armtempo import pipeline
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress
 from armtempo.link.board_messages import SequenceState
-from armtempo.panel import words
+from armtempo.panel import panel_page, words
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.panel.sequence_editor import SequenceEditor
 from nicegui import ui
@@ -134,6 +134,38 @@ def test_what_is_being_typed_into_a_step_stays_when_another_changes(
         assert page.named("step 1: repeat").value == "5"
         assert page.named("step 3: wait, s") is typed
         assert typed.value == "7"
+
+
+def test_a_press_on_a_step_that_is_just_gone_says_so(
+    operator: PanelBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its page is built anew a moment later."""
+    said: list[str] = []
+    monkeypatch.setattr(panel_page, "_say", lambda error: said.append(error.problem))
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    operator.sequences.open("day.toml")
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        late = [page.named(f"{text} {words.STEP} 4") for text in (words.UP, words.COPY, words.DELETE)]
+        typed = page.named("step 4: end of")
+        operator.sequences.delete(3)
+        before = operator.sequences.text
+        for button in late:
+            page.press_one(button)
+        page.fire(typed, "change", "loop")
+        assert said == [words.ROW_GONE] * 4
+        assert operator.sequences.text == before
+
+
+def test_a_page_without_control_changes_nothing_in_a_sequence(operator: PanelBoard, tmp_path: Path) -> None:
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    operator.sequences.open("day.toml")
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        operator.take_control("another page")
+        page.fire(page.named("step 3: wait, s"), "change", "7")
+        page.named(f"{words.STEP} 3").set_value("goto")
+        assert operator.sequences.text == SEQUENCE
 
 
 def test_planning_is_seen_and_not_begun_twice(
