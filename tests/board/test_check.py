@@ -98,6 +98,7 @@ def ends_of_pieces(record: bytes, at: float) -> list[float]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "step"), [(12.0, 12), (12.49, 12), (12.5, 13), (-12.5, -12), (-12.51, -13)]
 )

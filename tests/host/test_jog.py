@@ -223,6 +223,7 @@ def test_the_board_reads_what_was_planned(speed: float) -> None:
             assert -1e-9 <= found_s - length_s <= 1.01 * unit_s + 0.02 * length_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped.files())
 def test_the_first_step_comes_within_50_ms(name: str) -> None:
     """As a move begins ahead by nearly half a step, which no motor exceeds: jogs of joints, of the tool, and a goto."""

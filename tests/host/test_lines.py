@@ -121,6 +121,7 @@ def test_faults_of_a_line_are_seen(plan: Plan) -> None:
     assert line_faults(replace(plan, job=replace(plan.job, tool_segments=ways)))
 
 
+@pytest.mark.slow
 def test_a_redundant_arm_accelerates_its_tool_as_the_closed_form_does() -> None:
     """Its joints move far and the tool hardly, so the proof needs short pieces, which rounding must not hide."""
     here = (10.0, 40.0, 50.0)
@@ -252,6 +253,7 @@ def test_circles_through_points_nearly_on_a_line_are_refused(aside: float) -> No
     assert circle.length == pytest.approx(40.0 * np.pi)
 
 
+@pytest.mark.slow
 def test_ordinary_arcs_are_defined() -> None:
     rng = np.random.default_rng(41)
     for _ in range(200):

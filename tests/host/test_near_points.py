@@ -131,6 +131,7 @@ def test_a_job_is_split_at_its_merged_stops() -> None:
     assert [part.job.via for part in parts] == [(HERE, THERE), (THERE, END)]
 
 
+@pytest.mark.slow
 def test_a_recording_that_creeps_is_thinned_to_points_that_stay(tmp_path: Path) -> None:
     """It halts for a moment at each place, where via points by time come close."""
     rng = np.random.default_rng(6)

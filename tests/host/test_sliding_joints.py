@@ -311,6 +311,7 @@ def test_lists_of_positions_say_nothing_of_degrees() -> None:
         planner.plan(LIFT, Job("a", via=((0.0, 0.0), (100.0, 10.0)), corridor_deg=1.0))
 
 
+@pytest.mark.slow
 def test_a_motion_keeps_its_limits_and_goes_out_and_in_with_its_units(tmp_path: Path) -> None:
     plan = planner.plan(LIFT, Job("a", via=((0.0, 0.0), (150.0, 60.0), (20.0, -30.0)), **QUICK))
     most = plan.extremes[0].values

@@ -95,6 +95,7 @@ def test_a_tool_is_as_rows_after_the_last_joint(arm: Arm) -> None:
     assert np.all(one.reach_mm >= np.linalg.norm(poses[:, :3, 3] - flange, axis=1).max() - 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", [Arm.load("ar4"), SIX, OFFSET_WRIST], ids=lambda arm: arm.name)
 def test_the_inverse_brings_the_tool_to_the_pose(arm: Arm) -> None:
     rng = np.random.default_rng(18)

@@ -324,6 +324,7 @@ def test_pick_and_place_and_its_own_test(tmp_path: Path, monkeypatch: pytest.Mon
     test()
 
 
+@pytest.mark.slow
 def test_a_pallet(tmp_path: Path) -> None:
     run = testing.run(example("pallet.py", tmp_path), ARM)
     places = [call[1] for call in run.calls if call[0] == "goto" and call[1] not in ("home", (0, -50, 30))]
