@@ -58,9 +58,8 @@ def paste(page: Any, text: str) -> str:
 def undo_all(page: Any) -> bool:
     """Show the job as it was opened; whether it was another."""
     undo, undone = page.get_by_role("button", name="Undo", exact=True), False
-    while undo.is_enabled():
-        panels.press(page, undo)
-        page.wait_for_timeout(300)  # grey a little later
+    while undo.evaluate("one => { const on = !one.disabled; one.click(); return on; }"):
+        page.wait_for_timeout(300)  # grey a little later; a press that was late is made again
         undone = True
     return undone
 
