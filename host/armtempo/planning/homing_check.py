@@ -1,4 +1,4 @@
-"""The ways between the home posture and the switches, against the workspace.
+"""The moves between the home posture and the switches, against the workspace.
 
 Homing begins wherever the arm stands, which nobody knows: what it does until the first switch cannot be checked.
 """
@@ -14,7 +14,7 @@ from armtempo.planning import point_to_point, workspace_check
 
 
 def touching(arm: Arm) -> list[str]:
-    """The ways that would leave the workspace, one group of joints after the other, while the others are at home."""
+    """The moves that would leave the workspace, one group of joints after the other, while the others are at home."""
     if not workspace_check.can_touch(arm):
         return []
     problems = []
