@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import click
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.cli import options, resolve, results, state, typed_pose
 from armtempo.cli.options import BoardOptions

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Collection
-from dataclasses import dataclass
+
+from armtempo.basics.dataclass import dataclass
 
 Function = ast.FunctionDef | ast.Lambda
 

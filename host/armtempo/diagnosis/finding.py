@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
+
+from armtempo.basics.dataclass import dataclass
 
 
 class Level(Enum):

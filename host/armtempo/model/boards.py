@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+from armtempo.basics.dataclass import dataclass
 
 DEFAULT = "STM32F4DISC"
 _PORTS = "ABCDE"

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+
+from armtempo.basics.dataclass import dataclass
 
 REVOLUTE, PRISMATIC = "revolute", "prismatic"
 TYPES = (REVOLUTE, PRISMATIC)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
+from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
 from armtempo.model import pose

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from armtempo.basics.dataclass import dataclass
 
 SAME, BETTER, DIFFERS = "same", "better", "differs"
 POSE = (

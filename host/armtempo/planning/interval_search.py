@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.dataclass import dataclass
 from armtempo.basics.progress import Progress
 from armtempo.model.job import GRADIENT, Job
 from armtempo.model.parts import Limits

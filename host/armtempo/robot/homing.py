@@ -26,7 +26,7 @@ from armtempo.model.home_switches import HomeSwitch
 from armtempo.model.parts import Limits
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
-from armtempo.robot.running import attended, follow, put_once, raise_fault
+from armtempo.robot.running import attended, follow, on_board, raise_fault
 from armtempo.robot.stop_request import StopRequest
 
 HomingProgress = Callable[[str, int, int], object]
@@ -183,8 +183,8 @@ class _GroupHoming(Homing):
         slow_arm = _slowed(self._arm, home_switches.SLOW if is_slow else home_switches.FAST)
         trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
         motion = encoded_motion.of_trajectory(trajectory, self._arm)
-        key, flags = put_once(self._client, motion.data), self._flags(starts) | START_SEEKS * seeks
-        with attended(self._client, self._stop):
+        flags = self._flags(starts) | START_SEEKS * seeks
+        with on_board(self._client, motion.data) as key, attended(self._client, self._stop):
             follower = MotionFollower(self._client, self._client.start(key.name, key.crc, flags))
             end = follow(self._client, self._stop, follower).end
         tripped = self._client.status().fault_joint

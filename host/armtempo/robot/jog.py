@@ -99,8 +99,8 @@ class HeldJog:
         client = self._client
         client.need("jog", "moving by hand")
         encoded = _encoded(self.motion, self.arm)
-        key = running.put_once(client, encoded.data)
         with ExitStack() as ends:
+            key = ends.enter_context(running.on_board(client, encoded.data))
             # Nothing holds the jog while a broken port is waited for
             ends.enter_context(client.session.on_loss(OnLoss(retry_s=0.0)))
             self._run = client.start(key.name, key.crc, START_HELD)

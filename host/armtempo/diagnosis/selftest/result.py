@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from typing import Any
 
+from armtempo.basics.dataclass import dataclass
 from armtempo.diagnosis.finding import Level
 
 

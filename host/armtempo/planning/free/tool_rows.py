@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.dataclass import dataclass
 from armtempo.planning.collocation import Points
 from armtempo.planning.tool import Tool, ToolState
 from armtempo.planning.variables import MotionVariables, angle_basis
