@@ -6,9 +6,9 @@ The host drives homing by them (``robot/homing.py``), or the board alone, for a 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Protocol
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.model.parts import DrivenJoint
 

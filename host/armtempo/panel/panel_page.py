@@ -6,7 +6,7 @@ import asyncio
 import json
 import time
 from collections.abc import Awaitable, Callable, Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -15,7 +15,6 @@ from nicegui import background_tasks, run, ui
 from nicegui.element import Element
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import ArmtempoError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.model.arm import Arm

@@ -7,12 +7,12 @@ posture, where small motions of the tool need large motions of the joints. The a
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.forward import forward
