@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import builtins
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,6 @@ from armtempo_shared.program import EACH, MARK
 from armtempo_shared.rest_to_rest import PERCENT
 from armtempo_shared.sequence import MAX_COUNTERS
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.encoding import encode, encoded_program, planned_for
 from armtempo.model.arm import Arm

@@ -64,6 +64,7 @@ def loaded(plan: Plan, sequence: SequencePlan, arm: Arm, folder: Path) -> list[C
     ]
 
 
+@pytest.mark.slow
 def test_a_plan_is_old_when_its_frame_is_elsewhere(
     tmp_path: Path, planned: tuple[Plan, SequencePlan], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from armtempo_shared.limits import MAX_NAME
 from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.encoding import decode, encode, made_with
 from armtempo.model.arm import Arm

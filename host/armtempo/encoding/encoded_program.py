@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,6 @@ from armtempo_shared.limits import FULL_OUTPUT, MAX_MOTION_BYTES
 from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import ArmtempoError, InputError, PlanError
 from armtempo.encoding import encode, encoded_motion, planned_for
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
@@ -130,6 +129,7 @@ def _homing(arm: Arm) -> dict[str, Any]:
             [_home_switch(arm.driven[joint], joint, switch) for joint, switch in group.items()]
             for group in home_switches.groups(arm)
         ],
+        "names": home_switches.names(arm),
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from armtempo_shared import sequence, sequence_check
@@ -10,7 +11,6 @@ from armtempo_shared.sequence import ACTIVE, FAULT_THEN, NEXT_THEN, SequenceData
 from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.encoding import encode, encoded_motion, made_with
 from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey

@@ -7,7 +7,7 @@ sha256 of the plan, independent of white space; files of version 1 have none.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -17,7 +17,6 @@ from armtempo_shared.basis import BASIS
 from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.model import arm_json, exchange
 from armtempo.model.arm import Arm

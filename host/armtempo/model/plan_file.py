@@ -6,12 +6,12 @@ import hashlib
 import json
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from armtempo.basics import json_codec, json_text
 from armtempo.basics.atomic_file import check_replaceable, os_reason, replace_text
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 
 AGAIN = "plan it again"

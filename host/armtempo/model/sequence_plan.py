@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -12,7 +12,6 @@ from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
 from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm

@@ -6,7 +6,7 @@ import asyncio
 import json
 import time
 from collections.abc import Awaitable, Callable, Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -16,7 +16,6 @@ from nicegui.element import Element
 from nicegui.elements.mixins.disableable_element import DisableableElement
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.model.arm import Arm

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.basics.progress import Progress
 from armtempo.model import frame

@@ -4,14 +4,13 @@ by torque, with the arm's acceleration and jerk limits times one factor."""
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.basics.progress import Progress, part
 from armtempo.kinematics.chain import all_angles_deg

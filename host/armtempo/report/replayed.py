@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import os_reason
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import ArmtempoError, RunFolderError
 from armtempo.encoding import decode
 from armtempo.model import arm_json
