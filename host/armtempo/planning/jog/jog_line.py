@@ -309,7 +309,7 @@ class FollowedLine:
             if isinstance(angles, str):
                 raise InputError(f"the tool cannot follow the line: {angles}", "jog single joints")
             found.append(angles)
-        return np.degrees(np.array(found)[:, list(line.arm.driven_indices)])
+        return np.asarray(np.degrees(np.array(found)[:, list(line.arm.driven_indices)]))
 
     def is_kept(self, angle_points_deg: Array, distance_points: Array) -> bool:
         """Whether it is proven that the tool keeps to it, for splines of the driven joints, (S + 5, J), and of the
