@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_plan
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.robot.connect import connect
@@ -47,7 +47,7 @@ def motion_of(arm: Arm, segments: int, scale: float) -> bytes:
     angles = [[int(scale * 1000) * point for point in range(segments + 5)] for _ in arm.driven]
     times = [[1000 * point for point in range(segments + 5)]]
     record = point_to_point.straight("arm", arm.home_deg, arm.home_deg, arm)
-    crc = motion.Motion(encoded_motion.of_trajectory(record, arm).data).arm_crc
+    crc = motion.Motion(encoded_plan.of_trajectory(record, arm).data).arm_crc
     return motion.pack(5, angles, times, 1, motion.no_ramps(), crc)
 
 

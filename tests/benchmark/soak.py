@@ -19,7 +19,7 @@ from pathlib import Path
 
 import armtempo
 from armtempo.basics.errors import BoardError
-from armtempo.encoding import encoded_sequence
+from armtempo.encoding import encoded_plan
 from armtempo.model.sequence import Sequence
 from armtempo.simulator import LaunchOptions, edgelog, launch
 
@@ -72,7 +72,7 @@ def in_real_time(minutes: float, numbers: random.Random, interpreter: str, folde
             board.stop()
             assert board.client.sequence().ending == "stopped"
     (power,) = edgelog.read(folder / "edges")
-    motions = encoded_sequence.of_plan(plan).motions
+    motions = encoded_plan.of_plan(plan).legs
     order = [
         *range(LEADING),
         *itertools.islice(itertools.cycle(range(LEADING, LEADING + REPEATED)), len(power.starts)),

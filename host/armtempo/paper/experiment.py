@@ -76,12 +76,16 @@ def claims(series: list[Series]) -> list[Claim]:
 def _unoptimised(made: motions.Plans) -> Plan:
     """The plan of the shipped job with equal intervals of 2 s."""
     joints = tuple(motions.unoptimised(made.job, joint, 5) for joint in range(len(made.arm.driven)))
-    return replace(
-        made.quintic,
-        job=replace(made.job, name="feed-unoptimised"),
-        trajectory=Trajectory("feed-unoptimised", joints, False),
-        extremes=tuple(map(extremes.of_joint, joints)),
-        searches=(),
+    plan, name = made.quintic, "feed-unoptimised"
+    return Plan.of_job(
+        plan.arm,
+        replace(made.job, name=name),
+        plan.via_deg,
+        plan.notes,
+        Trajectory(name, joints, False),
+        (),
+        tuple(map(extremes.of_joint, joints)),
+        plan.versions,
     )
 
 

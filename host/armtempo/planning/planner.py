@@ -64,7 +64,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     speeds_deg_s = np.array([each.speed_deg_s for each in reached])
     workspace_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
     notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, trajectory))
-    return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
+    return Plan.of_job(arm, job, via, notes, trajectory, planned.searches, reached, versions())
 
 
 def _swing_note(arm: Arm, job: Job, trajectory: Trajectory) -> list[str]:

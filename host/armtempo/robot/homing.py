@@ -17,7 +17,7 @@ from armtempo_shared.homing import ELSEWHERE, HELD, MISSED, Homing
 from armtempo_shared.messages import START_HOMING, START_SWITCHES_BIT
 
 from armtempo.basics.errors import InputError, LinkError
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_plan
 from armtempo.link import Client
 from armtempo.link.follow import MotionFollower
 from armtempo.model import home_switches
@@ -26,7 +26,7 @@ from armtempo.model.home_switches import HomeSwitch
 from armtempo.model.parts import Limits
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
-from armtempo.robot.running import attended, follow, put_once, raise_fault
+from armtempo.robot.running import attended, follow, put_once, raise_failure
 from armtempo.robot.stop_request import StopRequest
 
 HomingProgress = Callable[[str, int, int], object]
@@ -201,13 +201,13 @@ class _GroupHoming(Homing):
             start_deg[index], end_deg[index] = starts[index], ends[index]
         slow_arm = _slowed(self._arm, home_switches.SLOW if is_slow else home_switches.FAST)
         trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
-        motion = encoded_motion.of_trajectory(trajectory, self._arm)
+        motion = encoded_plan.of_trajectory(trajectory, self._arm)
         key, flags = put_once(self._client, motion.data), self._flags(starts)
         with attended(self._client, self._stop):
             follower = MotionFollower(self._client, self._client.start(key.name, key.crc, flags))
             end = follow(self._client, self._stop, follower).end
         tripped = self._client.status().fault_joint
-        raise_fault(end)
+        raise_failure(self._client, end)
         self._stop.check()
         ends_deg = self._arm.transmission.angles_of_steps(end.positions.commanded_steps)
         self._ends_deg = {index: float(ends_deg[index]) for index in starts}

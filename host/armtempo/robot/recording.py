@@ -13,13 +13,12 @@ from armtempo_shared.sequence import MOVE
 
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding.encoded_motion import EncodedMotion
-from armtempo.encoding.encoded_sequence import Encoded
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link import Client
-from armtempo.link.board_messages import RowBegun, Sample
-from armtempo.link.follow import Followed, MotionFollower, RunEnd, SequenceFollower, number_in_run
+from armtempo.link.board_messages import RowBegun, Sample, SequenceState
+from armtempo.link.follow import Followed, Gap, MotionFollower, RunEnd, number_in_run
 from armtempo.model import arm_json
-from armtempo.model.sequence_plan import SequenceRow
+from armtempo.model.leg import PlanRow
 from armtempo.report import run_folder
 from armtempo.report.run_folder import (
     COMPLETE,
@@ -76,21 +75,20 @@ def new_run(parent: Path, encoded: Encoded, port: str, client: Client) -> RunFol
     """A new run folder with everything that is needed to repeat the run."""
     name, arm, plan = encoded.name, encoded.arm, encoded.plan
     where = {"arm": arm.name, "port": port, "virtual": client.info.virtual, "board": vars(client.info)}
-    legs = tuple((motion.name, motion.data) for motion in encoded.motions)
     rows = tuple(map(_row, encoded.rows))
     with run_folder.new_folder(parent, name) as path:
-        names = tuple(leg for leg, _ in legs)
+        names = tuple(leg.name for leg in encoded.legs)
         folder = RunFolder(path, name, run_folder.scales(arm), where, legs=names, rows=rows)
-        folder.write_legs(data for _, data in legs)
+        folder.write_legs(leg.data for leg in encoded.legs)
         if plan is None:
             arm_json.save(arm, path / run_folder.ARM)
         else:
-            plan.save(path / (run_folder.SEQUENCE if encoded.is_sequence else run_folder.TRAJECTORY))
+            plan.save(path / (run_folder.SEQUENCE if plan.is_sequence else run_folder.TRAJECTORY))
         folder.write()
     return folder
 
 
-def _row(row: SequenceRow) -> RunRow:
+def _row(row: PlanRow) -> RunRow:
     return RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words)
 
 
@@ -105,7 +103,7 @@ class Recorder:
         self._file = file
         self._watcher = watcher
         self._sequence = encoded.is_sequence
-        self._legs_s = [math.nan, *(motion.trajectory.duration_s for motion in encoded.motions)]
+        self._legs_s = [math.nan, *(leg.trajectory.duration_s for leg in encoded.legs)]
         self._begun_s = client.session.clock()
         self._row_of_run: dict[int, int] = {}  # of each run that was reported and may have more samples
 
@@ -122,32 +120,30 @@ class Recorder:
             for run in [run for run in self._row_of_run if run < event.run]:
                 del self._row_of_run[run]
 
-    def end(self, end: RunEnd, stopped: bool) -> None:
-        """A motion has ended; ``stopped``: a stop was wanted."""
+    def end(self, end: RunEnd | SequenceState, lost: tuple[Gap, ...], stopped: bool) -> None:
+        """It has ended; ``stopped``: a stop was wanted."""
+        repetition = self._file.repetition
+        if isinstance(end, SequenceState):
+            taken_s = self._client.session.clock() - self._begun_s
+            repetition.end_rows(end, fault_name(end.code), self._client.counters(), taken_s, lost)
+            return
         state = FAULT if end.fault else INTERRUPTED if stopped else COMPLETE
-        self._file.repetition.end(state, fault_name(end.fault), end.ticks, end.positions, end.lost)
-        self._file.repetition.notices = readable(end.notices)
-
-    def end_rows(self, followed: SequenceFollower) -> None:
-        """A sequence has ended."""
-        end, taken_s = followed.end, self._client.session.clock() - self._begun_s
-        self._file.repetition.end_rows(
-            end, fault_name(end.code), self._client.counters(), taken_s, followed.lost
-        )
+        repetition.end(state, fault_name(end.fault), end.ticks, end.positions, lost)
+        repetition.notices = readable(end.notices)
 
 
 @contextmanager
 def repetition(client: Client, encoded: Encoded, folder: RunFolder, watcher: Watcher) -> Iterator[Recorder]:
     """One start of a motion or sequence, recorded in the run folder, also if it ends early; then the watcher is told.
 
-    If neither ``end`` nor ``end_rows`` is called, it was interrupted, or its connection is broken.
+    If ``end`` is not called, it was interrupted, or its connection is broken.
     """
     with folder.begin_repetition(with_rows=encoded.is_sequence) as file:
         yield Recorder(client, encoded, folder, file, watcher)
     watcher.end(file.repetition)
 
 
-def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> RunFolder:
+def fetch(client: Client, motion: Encoded, folder_in: Path, port: str) -> RunFolder:
     """Write the samples that the board kept of its last run (of ``motion``) into a new run folder.
 
     Waits for the end of a run in progress. Raises LinkError if the board has no samples, or they are of a sequence.
@@ -170,5 +166,7 @@ def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> 
         for sample in chain([first] if first else [], samples):
             recorder.take(sample)
         end = follower.end
-        recorder.end(end, end.path_ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S)
+        recorder.end(
+            end, end.lost, end.path_ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S
+        )
     return folder
