@@ -23,7 +23,7 @@ from armtempo.encoding import flash_use
 from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link.board_messages import SequenceState
 from armtempo.link.follow import where
-from armtempo.model.leg import PlanRow
+from armtempo.model.leg import SequenceRow
 from armtempo.model.plan import PAUSE_S, Plan, Share
 from armtempo.model.sequence import Sequence, arm_named
 from armtempo.model.steps import position, whole_cycles
@@ -80,7 +80,7 @@ def _share(share: Share) -> dict[str, Any]:
     return {"duration_s": share.total_s, **asdict(share)}
 
 
-def _duration_s(planned: Plan, row: PlanRow) -> float | None:
+def _duration_s(planned: Plan, row: SequenceRow) -> float | None:
     """Duration of a row; None for a row without one."""
     if row.op == MOVE:
         return float(planned.legs[row.number].trajectory.duration_s)

@@ -16,7 +16,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.encoding import decode, encode, made_with
 from armtempo.model.arm import Arm
-from armtempo.model.leg import PlanRow, only_row
+from armtempo.model.leg import SequenceRow, only_row
 from armtempo.model.plan import Plan
 from armtempo.planning import brake_time, point_to_point
 from armtempo.splines.trajectory import Trajectory
@@ -48,7 +48,7 @@ class Encoded:
     """Name on the board."""
     arm: Arm
     legs: tuple[EncodedLeg, ...]
-    rows: tuple[PlanRow, ...]
+    rows: tuple[SequenceRow, ...]
     sequence: bytes = b""
     """The sequence record (layout: ``armtempo_shared.sequence``); none: the board runs the record of the only leg."""
     plan: Plan | None = None
@@ -180,14 +180,14 @@ def of_board(name: str, arm: Arm, fetch: Callable[[str], bytes]) -> Encoded:
 _THEN = {NEXT_THEN: "next", FAULT_THEN: "fault"}
 
 
-def described(record: SequenceData, arm: Arm) -> tuple[PlanRow, ...]:
+def described(record: SequenceData, arm: Arm) -> tuple[SequenceRow, ...]:
     """The rows of a stored sequence, each with what it does."""
     outputs, inputs = [output.name for output in arm.outputs], [one.name for one in arm.inputs]
     rows = []
     for index in range(record.rows):
         op, number, value, amount, step = row = record.row(index)
         words = _describe_row(record, row, outputs, inputs)
-        rows.append(PlanRow(op, number, value, amount, step, words))
+        rows.append(SequenceRow(op, number, value, amount, step, words))
     return tuple(rows)
 
 

@@ -47,7 +47,7 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class JobSolution:
     """How the motion of a job was found."""
 
     job: Job
@@ -60,7 +60,7 @@ class Solution:
 
 
 @dataclass(frozen=True, eq=False)
-class Leg:
+class PlanLeg:
     """One motion from rest to rest."""
 
     trajectory: Trajectory
@@ -69,12 +69,12 @@ class Leg:
     """What the tool holds; "": nothing."""
     tool: str = ""
     """The tool, "nothing": none; "": that of the plan's arm."""
-    solution: Solution | None = None
+    solution: JobSolution | None = None
     """None in a sequence, which keeps its motions alone."""
 
 
 @dataclass(frozen=True)
-class PlanRow:
+class SequenceRow:
     """What the board does in a step: a row of the record (``armtempo_shared.sequence``), with a description."""
 
     op: int
@@ -90,9 +90,9 @@ class PlanRow:
         return self.op, self.number, self.value, self.amount, self.step
 
 
-def only_row(name: str) -> PlanRow:
+def only_row(name: str) -> SequenceRow:
     """The row of a plan of one motion."""
-    return PlanRow(MOVE, 0, 0, 0, 1, f"run {name}")
+    return SequenceRow(MOVE, 0, 0, 0, 1, f"run {name}")
 
 
 def check_spline(spline: JointSpline, vias: int, where: str) -> None:

@@ -16,7 +16,7 @@ from armtempo.basics.errors import InputError
 from armtempo.model import arm_json, exchange, plan_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, Job
-from armtempo.model.leg import Leg, PlanRow, Search, Solution, check_spline, only_row
+from armtempo.model.leg import JobSolution, PlanLeg, Search, SequenceRow, check_spline, only_row
 from armtempo.model.plan_file import AGAIN, Content, JobContent, SequenceContent
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import Trajectory
@@ -67,9 +67,9 @@ class Plan:
 
     arm: Arm
     name: str
-    legs: tuple[Leg, ...]
+    legs: tuple[PlanLeg, ...]
     """Its different motions; of a sequence NAME-1, NAME-2, … on the board."""
-    rows: tuple[PlanRow, ...]
+    rows: tuple[SequenceRow, ...]
     versions: Mapping[str, str]
     """Versions on which the numbers depend: armtempo, numpy, scipy, Python, processor."""
     notes: tuple[str, ...] = ()
@@ -85,16 +85,14 @@ class Plan:
     def of_job(
         cls,
         arm: Arm,
-        job: Job,
-        via_deg: Array,
-        notes: tuple[str, ...],
+        solution: JobSolution,
         trajectory: Trajectory,
-        searches: tuple[Search, ...],
-        extremes: tuple[Extremes, ...],
+        notes: tuple[str, ...],
         versions: Mapping[str, str],
     ) -> Plan:
-        """The plan of a job's motion; ``via_deg``: the driven joints at the via points, (n + 1, J)."""
-        leg = Leg(trajectory, job.holds, "", Solution(job, via_deg, searches, extremes))
+        """The plan of a job's motion."""
+        job = solution.job
+        leg = PlanLeg(trajectory, job.holds, solution=solution)
         return cls(arm, job.name, (leg,), (only_row(job.name),), versions, notes, job.frames)
 
     def __repr__(self) -> str:
@@ -131,7 +129,7 @@ class Plan:
         return self._times()[0]
 
     def _times(self) -> tuple[Share | None, tuple[Cycle, ...]]:
-        open_: list[tuple[PlanRow, Share]] = []
+        open_: list[tuple[SequenceRow, Share]] = []
         share, endless = Share(), False
         cycles = []
         for row in self.rows:
@@ -169,7 +167,7 @@ class Plan:
         return self.trajectory.duration_s
 
     @property
-    def solution(self) -> Solution:
+    def solution(self) -> JobSolution:
         """How the motion of a job was found."""
         found = self.legs[0].solution if len(self.legs) == 1 else None
         if found is None:
@@ -232,14 +230,15 @@ class Plan:
         arm_json.check(content.arm, f"{path}: arm", AGAIN)
         if isinstance(content, JobContent):
             _check_motion(content, path)
-            return cls.of_job(**vars(content))
+            solution = JobSolution(content.job, content.via_deg, content.searches, content.extremes)
+            return cls.of_job(content.arm, solution, content.trajectory, content.notes, content.versions)
         _check_rows(content, path)
         none = ("",) * len(content.legs)
         each = zip(content.legs, content.loads or none, content.tools or none, strict=True)
         return cls(
             content.arm,
             content.name,
-            tuple(Leg(*leg) for leg in each),
+            tuple(PlanLeg(*leg) for leg in each),
             content.rows,
             content.versions,
             content.notes,

@@ -19,7 +19,7 @@ from armtempo.basics.atomic_file import check_replaceable, os_reason, replace_te
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
-from armtempo.model.leg import PlanRow, Search
+from armtempo.model.leg import Search, SequenceRow
 from armtempo.splines.extremes import Extremes
 from armtempo.splines.trajectory import Trajectory
 
@@ -50,7 +50,7 @@ class SequenceContent:
     arm: Arm
     name: str
     legs: tuple[Trajectory, ...]
-    rows: tuple[PlanRow, ...]
+    rows: tuple[SequenceRow, ...]
     counters: tuple[str, ...]
     versions: Mapping[str, str]
     loads: tuple[str, ...] = field(default=(), metadata=json_codec.ADDED)

@@ -11,7 +11,7 @@ from armtempo.basics.progress import Progress
 from armtempo.model import frame
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
-from armtempo.model.leg import Leg
+from armtempo.model.leg import PlanLeg
 from armtempo.model.parts import NOTHING
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
@@ -44,7 +44,7 @@ class SequenceMotions:
     progress: Progress | None
     holds: str = ""
     """The present load."""
-    legs: list[Leg] = field(default_factory=list)
+    legs: list[PlanLeg] = field(default_factory=list)
     changes_tool: bool = False
     notes: list[str] = field(default_factory=list)
     frames: list[str] = field(default_factory=list)
@@ -174,7 +174,7 @@ class SequenceMotions:
             raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _add(self, trajectory: Trajectory, holds: str) -> int:
-        self.legs.append(Leg(trajectory, holds, self.tool))
+        self.legs.append(PlanLeg(trajectory, holds, self.tool))
         return len(self.legs) - 1
 
     def same(self, one: Angles, other: Angles) -> bool:

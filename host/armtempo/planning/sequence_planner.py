@@ -10,7 +10,7 @@ from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.basics.progress import Progress
 from armtempo.model import steps as kinds
 from armtempo.model.arm import Arm
-from armtempo.model.leg import PlanRow
+from armtempo.model.leg import SequenceRow
 from armtempo.model.plan import Plan, check_size
 from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence
@@ -77,10 +77,10 @@ class _Compiler:
     """Index of the present place of each pallet that a repeat goes through."""
     _depth: int = 0
 
-    def rows(self, steps: tuple[Step, ...], here: Angles | None, name: str) -> tuple[list[PlanRow], _End]:
+    def rows(self, steps: tuple[Step, ...], here: Angles | None, name: str) -> tuple[list[SequenceRow], _End]:
         """The rows of some steps from a posture on, and the posture after them."""
         end = _End(here, name)
-        found: list[PlanRow] = []
+        found: list[SequenceRow] = []
         for step in steps:
             if isinstance(step, kinds.Repeat):
                 rows, end = self._repeat(step, end)
@@ -101,7 +101,7 @@ class _Compiler:
             found += rows
         return found, end
 
-    def _hold(self, step: kinds.Hold) -> list[PlanRow]:
+    def _hold(self, step: kinds.Hold) -> list[SequenceRow]:
         """The following motions are planned with the load, which is not sent to the board."""
         try:
             self.motions.arm.holding(step.load)
@@ -110,7 +110,7 @@ class _Compiler:
         self.motions.holds = step.load
         return []
 
-    def _use_tool(self, step: kinds.UseTool) -> list[PlanRow]:
+    def _use_tool(self, step: kinds.UseTool) -> list[SequenceRow]:
         """The following motions are planned with the tool, of which the board knows nothing."""
         try:
             self.motions.arm = self.motions.arm.with_tool(step.tool)
@@ -119,7 +119,7 @@ class _Compiler:
         self.motions.changes_tool = True
         return []
 
-    def _repeat(self, step: kinds.Repeat, before: _End) -> tuple[list[PlanRow], _End]:
+    def _repeat(self, step: kinds.Repeat, before: _End) -> tuple[list[SequenceRow], _End]:
         """The rows of a repeat; its first pass is separate if it starts at another posture."""
         outermost = not self._depth
         self._depth += 1
@@ -136,11 +136,11 @@ class _Compiler:
         if apart and step.times == 1:
             return first, end
         words = f"{step.times} times" if step.times else "for ever"
-        begin = PlanRow(record.REPEAT, 0, int(apart and outermost), times, step.step, f"repeat {words}")
-        close = PlanRow(record.END, 0, int(outermost), 0, step.step, "end of repeat")
+        begin = SequenceRow(record.REPEAT, 0, int(apart and outermost), times, step.step, f"repeat {words}")
+        close = SequenceRow(record.END, 0, int(outermost), 0, step.step, "end of repeat")
         return [*(first if apart else ()), begin, *rows, close], last
 
-    def _each_place(self, step: kinds.EachPlace, end: _End) -> tuple[list[PlanRow], _End]:
+    def _each_place(self, step: kinds.EachPlace, end: _End) -> tuple[list[SequenceRow], _End]:
         """The rows of each place, one after the other, as each has its own motions."""
         places = self._places(step)
         last = step.last or len(places)
@@ -160,13 +160,13 @@ class _Compiler:
             )
         outermost = not self._depth
         self._depth += 1
-        found: list[PlanRow] = []
+        found: list[SequenceRow] = []
         for index in range(step.first - 1, last)[:: -1 if step.reverse else 1]:
             self._present[step.pallet] = index
             rows, end = self.rows(step.steps, end.angles_deg, end.name)
-            found.append(PlanRow(record.REPEAT, 0, 0, 1, step.step, places[index].name))
+            found.append(SequenceRow(record.REPEAT, 0, 0, 1, step.step, places[index].name))
             found += rows
-            found.append(PlanRow(record.END, 0, int(outermost), 0, step.step, "end of place"))
+            found.append(SequenceRow(record.END, 0, int(outermost), 0, step.step, "end of place"))
         del self._present[step.pallet]
         self._depth -= 1
         return found, end
@@ -184,7 +184,7 @@ class _Compiler:
             raise type(error)(f"{step.where}repeat: {error.problem}", error.hint) from error
         return self.places[key]
 
-    def _place(self, step: kinds.ToPlace, here: _End) -> tuple[list[PlanRow], _End]:
+    def _place(self, step: kinds.ToPlace, here: _End) -> tuple[list[SequenceRow], _End]:
         """To the point above a place and down to it, or up from it."""
         key = "leave" if step.leave else "place"
         index = self._present.get(step.pallet)
@@ -203,7 +203,7 @@ class _Compiler:
         down, end = self._straight_to(place.name, place.pose, end, step, f"{where}{place.name}: ")
         return [*rows, *down], end
 
-    def _goto(self, step: kinds.Goto, here: _End) -> tuple[list[PlanRow], _End]:
+    def _goto(self, step: kinds.Goto, here: _End) -> tuple[list[SequenceRow], _End]:
         if step.line:
             return self._line(step, here)
         target = self._target(step)
@@ -212,7 +212,7 @@ class _Compiler:
         leg = self.motions.joint_move(here.angles_deg, target.angles_deg, f"{step.where}goto: ")
         return [_move(leg, step.step, f"goto {target.name}")], _End(target.angles_deg, target.name)
 
-    def _line(self, step: kinds.Goto, here: _End) -> tuple[list[PlanRow], _End]:
+    def _line(self, step: kinds.Goto, here: _End) -> tuple[list[SequenceRow], _End]:
         """A straight line of the tool; to a pose in the present branch of the arm."""
         posture = self.motions.arm.posture(step.target) if isinstance(step.target, str) else step.target
         pose = posture.where if isinstance(posture, ArmPosture) else None
@@ -225,7 +225,7 @@ class _Compiler:
 
     def _straight_to(
         self, name: str, to: Angles | Pose, here: _End, step: kinds.Goto | kinds.ToPlace, where: str
-    ) -> tuple[list[PlanRow], _End]:
+    ) -> tuple[list[SequenceRow], _End]:
         """A straight line of the tool to angles (J,), or to a pose."""
         if here.angles_deg is None:
             raise InputError(
@@ -239,7 +239,7 @@ class _Compiler:
         end = _End(to_angles(leg(leg.duration_s)) if isinstance(to, Pose) else to, name)
         return [_move(number, step.step, f"line to {name}")], end
 
-    def _run(self, step: kinds.RunMotion, here: _End) -> tuple[list[PlanRow], _End]:
+    def _run(self, step: kinds.RunMotion, here: _End) -> tuple[list[SequenceRow], _End]:
         motion = self.motions.motion(step.motion)
         trajectory = self.motions.planned(motion, step.where)
         start, end = to_angles(trajectory(0.0)), to_angles(trajectory(trajectory.duration_s))
@@ -266,23 +266,25 @@ class _Compiler:
         trajectory = self.motions.planned(motion, "")
         return NamedAngles(to_angles(trajectory(0.0)), f"the start of {motion.name}")
 
-    def _still(self, step: kinds.SetOutput | kinds.Wait | kinds.WaitInput | kinds.Count) -> PlanRow:
+    def _still(self, step: kinds.SetOutput | kinds.Wait | kinds.WaitInput | kinds.Count) -> SequenceRow:
         """The row of a step without motion."""
         if isinstance(step, kinds.SetOutput):
             output = self.motions.arm.output(step.output)
             raw = self.motions.arm.outputs[output].raw(step.to)
-            return PlanRow(record.OUTPUT, output, raw, 0, step.step, f"output {step.output} {step.to}")
+            return SequenceRow(record.OUTPUT, output, raw, 0, step.step, f"output {step.output} {step.to}")
         if isinstance(step, kinds.Wait):
-            return PlanRow(record.WAIT, 0, 0, round(step.wait_s * 1000), step.step, f"wait {step.wait_s:g} s")
+            return SequenceRow(
+                record.WAIT, 0, 0, round(step.wait_s * 1000), step.step, f"wait {step.wait_s:g} s"
+            )
         if isinstance(step, kinds.Count):
             if step.counter not in self.counters:
                 self.counters.append(step.counter)
             number = self.counters.index(step.counter)
-            return PlanRow(record.COUNT, number, 0, 0, step.step, f"count {step.counter}")
+            return SequenceRow(record.COUNT, number, 0, 0, step.step, f"count {step.counter}")
         value = int(step.active) | _THEN.get(step.on_timeout, record.STOP_THEN)
         limit = f", at most {step.timeout_s:g} s, then {step.on_timeout}" if step.timeout_s else ""
         words = f"wait for input {step.input}{'' if step.active else ' not'}{limit}"
-        return PlanRow(
+        return SequenceRow(
             record.WAIT_INPUT,
             self.motions.arm.input(step.input),
             value,
@@ -292,5 +294,5 @@ class _Compiler:
         )
 
 
-def _move(leg: int, step: int, words: str) -> PlanRow:
-    return PlanRow(record.MOVE, leg, 0, 0, step, words)
+def _move(leg: int, step: int, words: str) -> SequenceRow:
+    return SequenceRow(record.MOVE, leg, 0, 0, step, words)

@@ -12,7 +12,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.model.arm import Arm
 from armtempo.model.joint_unit import JointUnit
-from armtempo.model.leg import Solution
+from armtempo.model.leg import JobSolution
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
 from armtempo.report import analysis, peaks, replayed, run_reader
@@ -39,7 +39,7 @@ class LegEvaluation:
     trajectory: Trajectory
     arm: Arm | None
     """With what the tool holds on this leg; None if it is not known."""
-    solution: Solution | None
+    solution: JobSolution | None
     """None for a leg of a sequence, and if only the board had the motion."""
     repetitions: tuple[RepetitionData, ...]
     """Its recorded runs that have samples."""

@@ -207,9 +207,10 @@ class Motions:
         encoded = self._encoded(sequence)
         if not encoded.is_sequence:
             raise InputError(f"{encoded.name!r} is a motion, not a sequence", "run it with 'run'")
-        folder = None if out is None else Path(out)
-        end = self._run(encoded, 1, folder, Watcher(), stop, watcher, replace)
-        return cast(SequenceState, end)
+        seen = recording.StateWatcher(watcher)
+        return cast(
+            SequenceState, self._run(encoded, 1, None if out is None else Path(out), seen, stop, replace)
+        )
 
     def _run(
         self,
@@ -218,7 +219,6 @@ class Motions:
         out: Path | None,
         watcher: Watcher,
         stop: StopRequest | None,
-        on_state: SequenceWatcher = lambda _: None,
         replace: bool = False,
     ) -> RunEnd | SequenceState:
         """Store and run it so often, backwards in between; returns how the last time ended.
@@ -248,7 +248,7 @@ class Motions:
                     with running.attended(client, wanted):
                         run = client.start(key.name, key.crc)
                         follower: MotionFollower | SequenceFollower = (
-                            SequenceFollower(client, key.name, run, on_state)
+                            SequenceFollower(client, key.name, run, watcher.on_state)
                             if encoded.is_sequence
                             else MotionFollower(client, run)
                         )

@@ -16,9 +16,9 @@ from armtempo.basics.progress import Progress
 from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link import Client
 from armtempo.link.board_messages import RowBegun, Sample, SequenceState
-from armtempo.link.follow import Followed, Gap, MotionFollower, RunEnd, number_in_run
+from armtempo.link.follow import Followed, Gap, MotionFollower, RunEnd, SequenceWatcher, number_in_run
 from armtempo.model import arm_json
-from armtempo.model.leg import PlanRow
+from armtempo.model.leg import SequenceRow
 from armtempo.report import run_folder
 from armtempo.report.run_folder import (
     COMPLETE,
@@ -44,8 +44,21 @@ class Watcher:
     def on_sample(self, sample: Sample, duration_s: float) -> None:
         """A sample of a motion of ``duration_s`` has arrived; NaN for a motion of a sequence that was not reported."""
 
+    def on_state(self, state: SequenceState) -> None:
+        """The state of a sequence has changed."""
+
     def end(self, repetition: Repetition) -> None:
         """A repetition has ended, also by a stop or a fault."""
+
+
+class StateWatcher(Watcher):
+    """Calls a function with each state of a sequence."""
+
+    def __init__(self, call: SequenceWatcher) -> None:
+        self._call = call
+
+    def on_state(self, state: SequenceState) -> None:
+        self._call(state)
 
 
 class ProgressWatcher(Watcher):
@@ -65,6 +78,9 @@ class ProgressWatcher(Watcher):
             done_s = min(sample.path_ticks / TICK_HZ, duration_s)  # the board ends at a whole tick
             self._progress(self._ended * duration_s + done_s, self._repetitions * duration_s)
         self._inner.on_sample(sample, duration_s)
+
+    def on_state(self, state: SequenceState) -> None:
+        self._inner.on_state(state)
 
     def end(self, repetition: Repetition) -> None:
         self._ended += 1
@@ -88,7 +104,7 @@ def new_run(parent: Path, encoded: Encoded, port: str, client: Client) -> RunFol
     return folder
 
 
-def _row(row: PlanRow) -> RunRow:
+def _row(row: SequenceRow) -> RunRow:
     return RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words)
 
 
