@@ -140,6 +140,7 @@ def test_a_whole_pose_a_little_out_of_reach_is_met_within_its_tolerance() -> Non
     assert answer.miss.rotation_deg <= 0.1
 
 
+@pytest.mark.slow
 def test_a_refusal_lists_the_reasons_solution_by_solution() -> None:
     solver = PoseSolver(SIX)
     answer = solver.solve(Pose.of_angles((900.0, 0.0, 300.0), dict.fromkeys(WHOLE, 0.0)), solver.home_rad)

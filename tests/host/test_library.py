@@ -155,6 +155,7 @@ def test_a_plan_goes_through_its_via_points_and_its_file(plan: armtempo.Plan, tm
     assert again.job == plan.job
 
 
+@pytest.mark.slow
 def test_a_plan_goes_to_other_programs_and_comes_back_as_a_job(
     plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
 ) -> None:
@@ -232,6 +233,7 @@ def test_angles_that_are_a_name_are_refused_in_words(arm: armtempo.Arm) -> None:
         armtempo.forward(arm, "home")
 
 
+@pytest.mark.slow
 def test_an_arm_and_a_sequence_are_made_in_code() -> None:
     limits = armtempo.Limits(speed_deg_s=50, acceleration_deg_s2=100, jerk_deg_s3=500)
     motor = armtempo.Motor(channel=1, steps_per_rev=200, microsteps=16, gear_ratio=10)
@@ -381,6 +383,7 @@ def test_every_shipped_arm_gets_back_the_posture_that_made_a_pose(name: str) -> 
         assert (first.branch == "") == bool(PoseSolver(arm).refusals)
 
 
+@pytest.mark.slow
 def test_inverse_serves_poses_that_ask_for_less() -> None:
     arm = armtempo.Arm.load("moveo")
     home = armtempo.forward(arm, arm.home_deg)

@@ -229,6 +229,7 @@ SENTENCES = (
 """Parts of sentences that had to be read twice."""
 
 
+@pytest.mark.slow
 @sources.TOGETHER
 def test_sentences_that_had_to_be_read_twice_are_gone() -> None:
     texts = [

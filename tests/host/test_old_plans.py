@@ -63,6 +63,7 @@ def loaded(plan: Plan, sequence: Plan, arm: Arm, folder: Path) -> list[Callable[
     ]
 
 
+@pytest.mark.slow
 def test_a_plan_is_old_when_its_frame_is_elsewhere(
     tmp_path: Path, planned: tuple[Plan, Plan], monkeypatch: pytest.MonkeyPatch
 ) -> None:

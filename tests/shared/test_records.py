@@ -313,7 +313,7 @@ def test_versions_are_those_of_files_that_exist() -> None:
         "run": 2,
         "claim": 1,
         "arm record": 2,
-        "protocol": 7,
+        "protocol": 8,
     }
 
 

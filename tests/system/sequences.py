@@ -130,7 +130,6 @@ Angles = tuple[float, float, float]
 AWAY: tuple[tuple[Angles, Angles], ...] = (
     ((1.7, -1.43, 2.5), (0.45, -0.45, -0.45)),
     ((-1.5, 2.31, 1.8), (-0.45, 0.45, -0.45)),
-    ((0.2, 4.1, -5.3), (0.45, 0.45, 0.45)),
 )
 """Postures: how far from home, and then from a whole step. The first steps of a motion that begins close to the middle
 between two steps come close together, which is a case of its own to the step generator."""
@@ -140,7 +139,7 @@ _GAP_TICKS = 20_000
 """Steps in opposite directions that are closer are both left out; no motion here comes near it."""
 
 
-def make_flash(flash: Path, away: tuple[tuple[Angles, Angles], ...] = AWAY) -> None:
+def make_flash(flash: Path) -> None:
     """``flash``: is made, with the arm's record, the motions, and ``motions``, the list that the script reads.
 
     The motions are those of the shipped pick and place, and those from each of some postures close to home to each
@@ -155,7 +154,7 @@ def make_flash(flash: Path, away: tuple[tuple[Angles, Angles], ...] = AWAY) -> N
     assert encode.arm_record(quick) == encode.arm_record(ARM)
     per_deg = np.array([joint.steps_per_deg for joint in ARM.driven])
     postures = [np.array(ARM.home_deg)]
-    for away_deg, fractions in away:
+    for away_deg, fractions in AWAY:
         postures.append((np.rint((postures[0] + away_deg) * per_deg) + fractions) / per_deg)
     for number, ends in enumerate(itertools.permutations(postures, 2)):
         via = (ends[0], np.mean(ends, axis=0) + MIDDLE_DEG, ends[1])

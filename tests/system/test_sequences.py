@@ -142,6 +142,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 # ``armtempo demo --pick-and-place``: the shipped sequence, with the part sensor imitated
 
 
+@pytest.mark.long
 def test_two_parts_are_placed(tmp_path: Path) -> None:
     environment = {"ARMTEMPO_MICROPYTHON": interpreters.starter("cpython")}
     done = commandline.run("demo", "--pick-and-place", folder=tmp_path, **environment)

@@ -243,6 +243,7 @@ def test_case_with_the_core(case: scripted.Case, flashes: Path, core: str, tmp_p
 
 
 @pytest.mark.long
-def test_every_motion_of_a_soak_makes_the_steps_of_its_record(tmp_path: Path) -> None:
-    sequences.make_flash(tmp_path / "flash", sequences.AWAY[:2])
-    print(sequences.soak(QUICKEST, tmp_path / "flash", 10, seed=20268))
+@pytest.mark.seeds(20268)
+def test_every_motion_of_a_soak_makes_the_steps_of_its_record(seed: int, tmp_path: Path) -> None:
+    sequences.make_flash(tmp_path / "flash")
+    print(sequences.soak(QUICKEST, tmp_path / "flash", 10, seed))

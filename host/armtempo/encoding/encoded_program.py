@@ -129,6 +129,7 @@ def _homing(arm: Arm) -> dict[str, Any]:
             [_home_switch(arm.driven[joint], joint, switch) for joint, switch in group.items()]
             for group in home_switches.groups(arm)
         ],
+        "names": home_switches.names(arm),
     }
 
 

@@ -111,7 +111,7 @@ def _views(page: PanelPage) -> None:
         )
     page.speeds = ui.label("").classes("armtempo-speed-scale")
     page.speeds.set_visibility(False)
-    ui.label(words.UNKNOWN).classes("armtempo-unknown")
+    page.live_label("armtempo-unknown")
 
 
 def _dock(page: PanelPage) -> None:
@@ -258,6 +258,7 @@ def message(operator: PanelBoard, shape: ArmShape) -> dict[str, Any]:
         "tool": shape.tool(angles) if live.known else None,
         "ghost": poses if not live.known else None if target is None else shape.poses(target),
         "unknown": not live.known,
+        "old": live_texts.is_old(operator),
         "freeze": operator.can_freeze,
         "texts": live_texts.texts(operator),
     }

@@ -24,6 +24,7 @@ def texts(operator: PanelBoard) -> dict[str, str]:
         "armtempo-state": words.plain(state_line(operator)),
         "armtempo-where": position(operator) if live.known else words.UNKNOWN,
         "armtempo-said": words.plain(said),
+        "armtempo-unknown": words.OLD_STATE.format(age=live.age_s) if is_old(operator) else words.UNKNOWN,
     }
     for number, (angle, joint) in enumerate(zip(live.angles_deg, operator.arm.driven, strict=True), 1):
         found[f"armtempo-angle-{number}"] = f"{angle:.2f}{joint.unit.sign}" if live.known else "?"
@@ -41,6 +42,11 @@ def position(operator: PanelBoard) -> str:
         roll, pitch, yaw = np.round(to_rpy_deg(pose), 1) + 0.0
         return f"x {x:.1f}  y {y:.1f}  z {z:.1f} mm  ·  roll {roll:.1f}  pitch {pitch:.1f}  yaw {yaw:.1f}°  ·  {where}"
     return where
+
+
+def is_old(operator: PanelBoard) -> bool:
+    """Whether the arm may have moved since the board was last heard: it was known, and the connection is broken."""
+    return bool(operator.trouble) and operator.live.known and operator.live.age_s > OLD_S
 
 
 def state_line(operator: PanelBoard) -> str:

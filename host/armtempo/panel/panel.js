@@ -71,6 +71,7 @@ window.armtempo = {
     document.body.inert = false;
     this.target = message.ghost;
     document.body.classList.toggle("unknown", message.unknown); // the arm is then drawn as its ghost
+    document.body.classList.toggle("old", message.old); // nobody knows where it is now
     document.body.classList.toggle("freezes", message.freeze);
     if (JSON.stringify(message.tool) !== JSON.stringify(this.tool)) this.tool = message.tool;
     if (JSON.stringify(message.dials) !== JSON.stringify(this.angles)) this.angles = message.dials;

@@ -81,6 +81,8 @@ class PanelBoard(BoardLink):
         """Text: the running command."""
         self.progress = 0.0
         """Its progress, 0 to 1."""
+        self.left = 0.0
+        """What is left of it; of a run in seconds of motion."""
         self.failure = ""
         """Text: why the last command failed; "" after the next one has begun."""
         self.guiding = False
@@ -226,7 +228,11 @@ class PanelBoard(BoardLink):
 
     def home_to_switches(self, joint: str | None = None) -> None:
         """Home the joints that have switches, or one of them alone; each that is at home is told."""
-        self.board.home_to_switches(self.arm, joint=joint, progress=self._tell_homing)
+        self.live.sought = True
+        try:
+            self.board.home_to_switches(self.arm, joint=joint, progress=self._tell_homing)
+        finally:
+            self.live.sought = False
         self._homed(joint)
 
     def _tell_homing(self, text: str, done: int, whole: int) -> None:
@@ -264,6 +270,7 @@ class PanelBoard(BoardLink):
     def run(self, plan: Plan, times: int) -> None:
         """Load a plan and run it; its report is made when it is asked for."""
         self.upload(plan)
+        self.part(0.0, times * plan.total_s)
         self.live.plan = plan
         self.board.run(plan, times, self.runs, self.part, stop=self._stop)
 
@@ -284,7 +291,7 @@ class PanelBoard(BoardLink):
 
     def part(self, done: float, whole: float) -> None:
         """Store the progress of the running command."""
-        self.progress = done / whole if whole else 0.0
+        self.left, self.progress = whole - done, done / whole if whole else 0.0
 
     def preparing(self, done: float, whole: float) -> None:
         """As ``part``, of what is done before something moves: it ends, with Stopped, if a stop was asked for."""

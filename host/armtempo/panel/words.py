@@ -48,7 +48,8 @@ TAKE_CONTROL = "Take control"
 IN_CONTROL = "In control"
 LOST = (
     "The panel's program does not answer. Nothing can be moved or stopped from here. "
-    "A held move has ended; a motion that was started with Run goes on to its end: stop it with the E-stop."
+    "A held move has ended; a motion that was started with Run goes on to its end: stop it with the E-stop. "
+    "Once the panel is started again, open the address that it prints."
 )
 VIRTUAL = "virtual board"
 

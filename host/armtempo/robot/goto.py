@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from armtempo_shared import limits, wire
+from armtempo_shared import limits
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_plan
-from armtempo.encoding.encoded_plan import Encoded, MotionKey
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Followed, MotionFollower
@@ -22,8 +21,8 @@ from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.planning import point_to_point, via_points, workspace_check
 from armtempo.ports.names import is_sim
-from armtempo.robot import arm_state
-from armtempo.robot.running import attended, follow, nothing, put_once, raise_failure
+from armtempo.robot import arm_state, running
+from armtempo.robot.running import attended, follow, nothing, raise_failure
 from armtempo.robot.stop_request import StopRequest
 from armtempo.splines.trajectory import Trajectory
 
@@ -31,8 +30,6 @@ Where = Plan | Encoded | Path | str | ArrayLike
 """A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
 (or of its file) or sequence."""
 _NAME = "goto"
-_STORED = "tmp-goto"
-"""Name on the board of a move that is larger than its memory."""
 
 
 @dataclass(frozen=True)
@@ -84,23 +81,9 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
 def move_once(
     client: Client, data: bytes, stop: StopRequest, take: Callable[[Followed], object] = nothing
 ) -> None:
-    """Run a motion record once, from the board's memory; raises BoardError if a fault ends it.
-
-    One that is larger than that is stored and removed again.
-    """
-    stored = len(data) > client.info.once_bytes
-    if stored:
-        client.upload(_STORED, data)
-        key = MotionKey(_STORED, wire.record_crc(data))
-    else:
-        key = put_once(client, data)
-    try:
-        with attended(client, stop):
-            end = follow(client, stop, MotionFollower(client, client.start(key.name, key.crc)), take).end
-    finally:
-        if stored:
-            with suppress(LinkError):  # do not hide the earlier error
-                client.remove(_STORED)
+    """Run a motion record once; raises BoardError if a fault ends it."""
+    with running.on_board(client, data) as key, attended(client, stop):
+        end = follow(client, stop, MotionFollower(client, client.start(key.name, key.crc)), take).end
     raise_failure(client, end)
 
 

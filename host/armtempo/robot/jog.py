@@ -96,8 +96,8 @@ class HeldJog:
         """Upload and start it; raises BoardError if the board refuses."""
         client = self._client
         client.need("jog", "moving by hand")
-        key = running.put_once(client, _record(self.motion, self.arm))
         with ExitStack() as ends:
+            key = ends.enter_context(running.on_board(client, _record(self.motion, self.arm)))
             # Nothing holds the jog while a broken port is waited for
             ends.enter_context(client.session.on_loss(OnLoss(retry_s=0.0)))
             self._run = client.start(key.name, key.crc, START_HELD)

@@ -29,9 +29,22 @@ LOCK_S = 1.0
 """A request from another thread waits this long for its turn to talk to the board."""
 
 
-def put_once(client: Client, data: bytes) -> MotionKey:
-    """Put a motion record into the board's memory, to be run once; raises InputError if it is too large."""
-    return MotionKey(ONCE_NAME, client.put_once(data))
+_STORED = "tmp-move"
+"""Name on the board of a move that is larger than its memory."""
+
+
+@contextmanager
+def on_board(client: Client, data: bytes) -> Iterator[MotionKey]:
+    """Put a motion record on the board, to be run once: in its memory, or, if larger, stored until the context ends."""
+    if len(data) <= client.info.once_bytes:
+        yield MotionKey(ONCE_NAME, client.put_once(data))
+        return
+    client.upload(_STORED, data)
+    try:
+        yield MotionKey(_STORED, wire.record_crc(data))
+    finally:
+        with suppress(LinkError):  # do not hide the earlier error
+            client.remove(_STORED)
 
 
 def nothing(event: Followed) -> None:
