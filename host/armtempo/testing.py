@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import builtins
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,6 @@ from armtempo_shared.program import EACH, MARK
 from armtempo_shared.rest_to_rest import PERCENT
 from armtempo_shared.sequence import MAX_COUNTERS
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.encoding import encode, encoded_program, planned_for
 from armtempo.model.arm import Arm
@@ -201,7 +200,7 @@ class _Work:
         file = self._program.motion_file(name)
         if not file.is_file():
             raise InputError(f"no motion {name!r}: {file} does not exist", "plan it")
-        plan = Plan.load(file)
+        plan = Plan.load_motion(file)
         planned_for.check(file, plan, self._arm)
         motion = plan.trajectory
         start = self._arm.transmission.whole_steps(motion(0.0))

@@ -28,7 +28,7 @@ The table has
   approaches, and ``groups``: of joints that are homed together a list of [joint, side (-1: low end, 1: high), steps
   where its switch trips, those of the range's end there, length of the range, of the longest approach, of the last way
   back, of that between both approaches, the farthest that the switch may stay pressed, and how near its end a motion
-  counts as not stopped].
+  counts as not stopped], ``names``: of each joint [name, unit].
 """
 
 import json

@@ -237,6 +237,7 @@ def test_what_looks_wrong_about_a_job(tmp_path: Path, via: str, level: str, said
     assert run_check("--job", path).exit_code == (1 if level == "error" else 0)
 
 
+@pytest.mark.slow
 def test_an_arc_that_the_arm_cannot_follow_is_an_error(tmp_path: Path) -> None:
     arm = Arm.load("ar4")
     here = arm.placed([10.0, 20.0, 10.0, 10.0, 40.0, 20.0])

@@ -246,6 +246,7 @@ def test_the_first_step_comes_within_50_ms(name: str) -> None:
         assert np.any(np.rint(soon) != 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
 def test_the_plan_of_a_jog_takes_no_new_memory_each_time() -> None:
     """Memory that is given back is zeroed page by page when it is needed again; in a process with a heap of its own."""

@@ -180,6 +180,7 @@ def test_rounded_poses_are_put_right_and_the_first_wrong_one_is_named() -> None:
         armtempo.inverse_many(arm, pose)
 
 
+@pytest.mark.slow
 def test_many_poses_of_an_arm_without_a_closed_form_are_solved_too() -> None:
     """One with a sliding joint, also out of reach."""
     arm = armtempo.Arm.load("scara_z")

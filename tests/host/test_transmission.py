@@ -316,6 +316,7 @@ def test_its_file_names_each_finding() -> None:
         encode.arm_record(replace(THOR, joints=fast))
 
 
+@pytest.mark.slow
 def test_files_keep_the_coupling(tmp_path: Path) -> None:
     arm_json.save(THOR, tmp_path / "arm.json")
     assert arm_json.load(tmp_path / "arm.json") == THOR
@@ -350,7 +351,8 @@ def test_rows_of_the_file_are_those_of_motors() -> None:
     np.testing.assert_array_equal(np.array(THOR.coupling)[4:, 4:], WRIST)
 
 
-@pytest.mark.parametrize("on_board", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.slow
+@pytest.mark.parametrize("on_board", [False, True])
 def test_a_report_sees_the_joints(on_board: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps and counts of motors become angles of joints, also of a motion that only the board had."""
     made_runs.draw_nothing(monkeypatch)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from armtempo import simulator
 from armtempo.basics.errors import BoardError
-from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding import encode, encoded_plan
 from armtempo.link import Opening, open_board, traffic
 from armtempo.link.board_messages import Done, Event, Sample
 from armtempo.link.follow import MotionFollower
@@ -148,7 +148,7 @@ def test_samples_wait_for_a_host_that_does_not_read() -> None:
     ):
         arm_state.configure(board, arm, replace=True)
         arm_state.home(board, arm)
-        stored = store(board, [("slow", encoded_motion.of_trajectory(motion, arm).data)])
+        stored = store(board, [("slow", encoded_plan.of_trajectory(motion, arm).data)])
         assert motion.duration_s > 50.0
         follower = MotionFollower(board, board.start(stored.name, stored.crc))
         time.sleep(AWAY_S)

@@ -219,11 +219,15 @@ class UserProgram(Sequencer):
         homing.home(self, plan)
 
     def move_homing(
-        self, start: "Sequence[int]", target: "Sequence[int]", limits: "Sequence[Sequence[int]]"
+        self,
+        start: "Sequence[int]",
+        target: "Sequence[int]",
+        limits: "Sequence[Sequence[int]]",
+        seeks: bool,
     ) -> int:
-        """Make a move of homing from where the joints are taken to be; returns the joint whose switch ended it, or
-        NO_JOINT."""
-        self._make_move(start, target, limits, _PERCENT, "home", messages.START_HOMING)
+        """Make a move of homing from where the joints are taken to be; returns as ``Homing.move``."""
+        flags = messages.START_HOMING | messages.START_SEEKS * seeks
+        self._make_move(start, target, limits, _PERCENT, "home", flags)
         moves = True
         while moves:
             moves = self.moving()

@@ -6,7 +6,7 @@ import dataclasses
 import inspect
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, partial, wraps
+from functools import cache, wraps
 from itertools import chain, repeat
 from operator import call
 from types import UnionType
@@ -14,7 +14,6 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 
 import numpy as np
 
-from armtempo.basics.dataclass import wrap_init
 from armtempo.basics.errors import InputError
 from armtempo.basics.kinds import is_number, is_text, is_whole
 from armtempo.basics.text import hidden
@@ -56,7 +55,7 @@ def _checked_methods(target: T, owner: str) -> T:
 
 def checked_fields(target: type[T]) -> type[T]:
     """A data class whose fields are checked when an object is made."""
-    wrap_init(target, partial(_wrapped, owner=target.__name__))
+    target.__init__ = _wrapped(target.__init__, target.__name__)  # type: ignore[method-assign]
     return target
 
 

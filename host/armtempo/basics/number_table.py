@@ -6,10 +6,10 @@ import csv
 import math
 import re
 from collections.abc import Collection, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from armtempo.basics.atomic_file import os_reason
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import is_number
 

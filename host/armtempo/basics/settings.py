@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 
 FILE = "armtempo.toml"

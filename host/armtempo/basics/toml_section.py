@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, dataclass, fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
 

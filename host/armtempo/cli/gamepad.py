@@ -10,13 +10,12 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from types import MappingProxyType
 from typing import Any
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError, MissingPackageError
 from armtempo.cli.keys import Keys
 

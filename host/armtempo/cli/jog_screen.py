@@ -5,12 +5,12 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from threading import Thread
 from typing import Self
 
 import click
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import ArmtempoError, BoardError, InputError, LinkError, PlanError
 from armtempo.basics.text import did_you_mean
 from armtempo.cli.keys import END, INTERRUPT, Keys

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import click
 from armtempo_shared import wire
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import BoardError, LinkError
 from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import click
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import LinkError
 from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions

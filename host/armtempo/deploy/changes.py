@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import LinkError
 from armtempo.deploy import program_files, sectors
 from armtempo.deploy.remote import Survey

@@ -10,11 +10,10 @@ import threading
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import LinkError
 from armtempo.deploy import sectors
 from armtempo.link.program_version import IN_LIBRARY

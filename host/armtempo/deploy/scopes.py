@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Collection
-
-from armtempo.basics.dataclass import dataclass
+from dataclasses import dataclass
 
 Function = ast.FunctionDef | ast.Lambda
 

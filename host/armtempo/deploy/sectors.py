@@ -10,9 +10,8 @@ import ast
 import struct
 import zlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-
-from armtempo.basics.dataclass import dataclass
 
 ADDRESS = 0x080C0000
 """Of sectors 10 and 11, the last of a chip with 1 MB (RM0090 3.3)."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from armtempo_shared import armrecord, engine_memory, limits
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.encoding import encode
 from armtempo.model.arm import Arm

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.kinematics.formulas import wrist_centre
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import folded, inverse_of_pose, spread

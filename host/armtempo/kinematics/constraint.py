@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.kinematics.forward import Frame
 from armtempo.model.tool_pose import APPROACH, PITCH, ROLL, YAW, Pose
 

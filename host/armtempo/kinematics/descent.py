@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.kinematics.constraint import Constraint, Turned, Vector, cross, dot
 from armtempo.kinematics.forward import Frame, frames
 from armtempo.kinematics.geometry import Geometry

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.model.arm import Arm
 from armtempo.model.joint_unit import SLIDE_MM
 

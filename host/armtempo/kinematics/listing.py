@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.kinematics.choice import Candidate, Choice
 from armtempo.kinematics.constraint import Miss
 from armtempo.kinematics.numerical import NumericalSolution, NumericalSolutions

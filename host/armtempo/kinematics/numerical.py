@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.descent import PoseProblem, Posture, descend
 from armtempo.kinematics.forward import forward

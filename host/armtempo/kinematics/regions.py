@@ -7,13 +7,13 @@ arm postures (elbow up and down) inside, one on the border, none outside.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.kinematics import formulas
 from armtempo.kinematics.shape import Shape
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.kinematics import formulas
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.shape import Shape

@@ -8,9 +8,9 @@ shoulder offsets d2 and d3, and the whole last row (d6, a6, alpha6) are free.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.kinematics.geometry import Geometry, twist
 

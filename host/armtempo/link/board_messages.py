@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from typing import Any
 
 from armtempo_shared import wire
@@ -10,7 +11,6 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo_shared.messages import FEATURES, RATES_MEASURED
 from armtempo_shared.sequence import ENDINGS
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.text import visible
 from armtempo.ports.names import is_virtual
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from armtempo_shared import wire
 from armtempo_shared.messages import MAX_COMMAND, MAX_PAYLOAD, PERMILLE, PROGRAM, SEQUENCE, START_HELD
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.basics.progress import Progress
 from armtempo.link import board_messages

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from armtempo_shared import wire
 from armtempo_shared.messages import SYNC
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import (
     BoardError,
     DisturbedError,
@@ -88,11 +88,8 @@ class Opening:
     """Called with messages about the connection."""
 
 
-_USUAL = Opening()
-
-
 @contextmanager
-def open_board(port: str, how: Opening = _USUAL, arm: Arm | None = None) -> Iterator[Client]:
+def open_board(port: str, how: Opening = Opening(), arm: Arm | None = None) -> Iterator[Client]:
     """Open the board on ``port``; a sim port starts a virtual board that lives as long as the context.
 
     ``arm``: moved by a virtual board's motors. Raises InputError if there is no such port, PortInUseError if

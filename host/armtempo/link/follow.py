@@ -5,12 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import LinkError, OtherBoardError
 from armtempo.link.board_messages import (
     Done,

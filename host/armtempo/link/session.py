@@ -11,11 +11,11 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from armtempo_shared import wire
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import ArmtempoError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.link import board_messages
 from armtempo.link.board_lock import BoardLock

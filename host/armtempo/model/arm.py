@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +11,6 @@ from pathlib import Path
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import tomlkit
 
 from armtempo.basics import toml_table
 from armtempo.basics.atomic_file import replace_text, replace_texts
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.model import frame, posture, taught, tool
 from armtempo.model.arm import Arm

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-
-from armtempo.basics.dataclass import dataclass
+from dataclasses import dataclass
 
 DEFAULT = "STM32F4DISC"
 _PORTS = "ABCDE"

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import string
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, InitVar, field, replace
+from dataclasses import KW_ONLY, InitVar, dataclass, field, replace
 from pathlib import Path
 
 from armtempo_shared.limits import MAX_NAME, MAX_SEGMENTS
 
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
 from armtempo.model import frame, posture_file, shipped, tool_segment, via_table

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-
-from armtempo.basics.dataclass import dataclass
+from dataclasses import dataclass
 
 REVOLUTE, PRISMATIC = "revolute", "prismatic"
 TYPES = (REVOLUTE, PRISMATIC)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from armtempo_shared.limits import FULL_OUTPUT
 
 from armtempo.basics.arguments import checked, checked_fields
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 

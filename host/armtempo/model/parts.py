@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
 
@@ -11,7 +11,6 @@ from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS
 
 from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked_fields
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_section import check, key
 from armtempo.model import joint_unit

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.model import engine_pins
 from armtempo.model.boards import BOARDS, DEFAULT, TIMER_OUTPUTS, BoardPins, TimerOutput
 from armtempo.model.engine_pins import ChannelUser

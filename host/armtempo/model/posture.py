@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from armtempo.basics.arguments import checked_fields
-from armtempo.basics.dataclass import dataclass
 from armtempo.model.tool_pose import Pose
 
 HOME = "home"

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from dataclasses import dataclass
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.model import engine_pins, pin_use
 from armtempo.model.boards import BOARDS
 from armtempo.model.pin_use import PinUser

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -13,7 +13,6 @@ from armtempo_shared.sequence import MAX_NESTING, MAX_REPEATS
 
 from armtempo.basics import toml_table
 from armtempo.basics.arguments import checked, checked_fields
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
@@ -264,7 +263,7 @@ class _Reader:
     def _motion(self, table: Table, key: str) -> SourceMotion:
         path = self.file.parent / table.text(key)
         if path not in self.motions:
-            source = Plan.load(path) if path.suffix == ".json" else Job.load(path, self.arm)
+            source = Plan.load_motion(path) if path.suffix == ".json" else Job.load(path, self.arm)
             self.motions[path] = SourceMotion(path.stem, source)
         return self.motions[path]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 
 _DATA = Path(__file__).parents[1] / "data"

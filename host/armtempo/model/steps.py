@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, field
+from dataclasses import KW_ONLY, dataclass, field
 
 from armtempo_shared.sequence import MAX_REPEATS, MAX_WAIT_MS
 
 from armtempo.basics.arguments import checked_fields
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.model.job import Job, is_name
 from armtempo.model.plan import Plan

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from armtempo.basics import toml_section
 from armtempo.basics.arguments import checked_fields
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_section import key
 from armtempo.basics.toml_table import Table

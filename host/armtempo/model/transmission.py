@@ -7,13 +7,13 @@ angles: motors = coupling x joints, as in the table ``[coupling]`` of an arm fil
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table

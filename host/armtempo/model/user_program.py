@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import inspect
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from armtempo_shared.program import EACH, MARK
 from armtempo_shared.sequence import MAX_COUNTERS
 
 from armtempo.basics import number_table
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.text import did_you_mean
 from armtempo.model import home_switches, program_calls

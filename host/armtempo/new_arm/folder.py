@@ -6,12 +6,11 @@ import json
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from armtempo.basics import toml_table
 from armtempo.basics.atomic_file import os_reason
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.model import shipped
 from armtempo.model.arm import Arm

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+from dataclasses import dataclass, fields
 
 from armtempo_shared.limits import MAX_STEP_RATE, MAX_STEP_RATE_SUM
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.model import joint_unit
 from armtempo.model.joint_unit import PRISMATIC, REVOLUTE, TYPES, JointUnit

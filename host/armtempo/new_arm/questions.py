@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from armtempo_shared.limits import MAX_ENCODERS, MAX_JOINTS, MAX_STEP_RATE
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.text import visible
 from armtempo.model import joint_unit, shipped
 from armtempo.model.joint_unit import PRISMATIC, REVOLUTE

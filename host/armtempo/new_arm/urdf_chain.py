@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.model.joint_unit import DEG, SLIDE_MM, JointUnit, is_range_doubtful, is_speed_doubtful
 from armtempo.model.joint_unit import MM as MM_UNIT
 from armtempo.new_arm.urdf_bodies import Body

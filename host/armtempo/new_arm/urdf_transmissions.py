@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
-
-from armtempo.basics.dataclass import dataclass
 
 _DIFFERENTIAL, _FOUR_BAR = "DifferentialTransmission", "FourBarLinkageTransmission"
 _SIMPLE = "SimpleTransmission"

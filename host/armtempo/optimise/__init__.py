@@ -9,7 +9,7 @@ Each algorithm is a module of this package with
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from importlib import import_module
 from types import ModuleType
 
@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress
 from armtempo.optimise.task import Function, Parameter, Result, Task, Value

@@ -10,12 +10,12 @@ matrix follows it. (Nocedal and Wright, Numerical Optimization, 2nd ed., chapter
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.progress import alive
 from armtempo.optimise.kkt import Equalities
 

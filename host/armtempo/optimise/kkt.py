@@ -6,11 +6,12 @@ Each variable and equality has a place on a line, and is coupled only to neighbo
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 
 Index = NDArray[np.intp]
 

@@ -14,13 +14,13 @@ Inequalities that are linear, and met at the start, are met by every iterate.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.progress import alive
 from armtempo.optimise.interior_point import Program
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from threading import Lock
 
 from armtempo import pipeline
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import RunFolderError
 from armtempo.panel import words
 from armtempo.report import run_reader, run_report

@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from threading import Lock
 from typing import Self
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.panel import words
 

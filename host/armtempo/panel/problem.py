@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum, auto
 from functools import partial
 from typing import TYPE_CHECKING
 
 from nicegui import ui
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.panel import words
 from armtempo.panel.panel_board import Needs, PanelBoard
 

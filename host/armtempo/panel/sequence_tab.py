@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armtempo.basics.arrays import Array
     from armtempo.basics.progress import Progress
     from armtempo.link.board_messages import SequenceState
-    from armtempo.model.sequence_plan import SequencePlan
+    from armtempo.model.plan import Plan
     from armtempo.panel.panel_page import PanelPage
     from armtempo.panel.press import Press
 
@@ -47,7 +47,7 @@ class SequenceTab:
         """What the table was built for, as ``_form``."""
         self._rows: list[ui.row] = []
         self._times: dict[int, ui.label] = {}
-        self._timed: SequencePlan | None = None
+        self._timed: Plan | None = None
         self._file = FileRow(page, self._editor, words.SEQUENCE_FILE, words.of_sequence)
         with ui.row():
             self._plan_row = PlanRow(
@@ -199,7 +199,7 @@ class SequenceTab:
 
     # plan, play, run
 
-    def _planned(self, progress: Progress) -> SequencePlan:
+    def _planned(self, progress: Progress) -> Plan:
         """The plan of the present steps."""
         if (plan := self._editor.plan) is None:
             version = self._editor.version
@@ -215,7 +215,7 @@ class SequenceTab:
             page.stop_playing()
             return
         for row in [row for row in plan.rows if row.op == MOVE]:
-            leg = plan.legs[row.number]
+            leg = plan.legs[row.number].trajectory
             if not await page.play(leg.duration_s, partial(_show, page, leg)):
                 break
         page.show_ghost(None)
@@ -245,9 +245,13 @@ def _where(state: SequenceState) -> str:
     return f"{state.ending}: {position(state.step, state.cycle)}"
 
 
-def _time_of(plan: SequencePlan, step: int) -> str:
+def _time_of(plan: Plan, step: int) -> str:
     """The planned time of a step, once; "" for one that takes none."""
-    moves = [plan.legs[row.number].duration_s for row in plan.rows if row.step == step and row.op == MOVE]
+    moves = [
+        plan.legs[row.number].trajectory.duration_s
+        for row in plan.rows
+        if row.step == step and row.op == MOVE
+    ]
     waits = [row.amount / 1000 for row in plan.rows if row.step == step and row.op == WAIT]
     time_s: Any = sum(moves) + sum(waits)
     return f"{time_s:.2f} s" if time_s else ""

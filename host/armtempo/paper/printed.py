@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armtempo.basics.dataclass import dataclass
+from dataclasses import dataclass
 
 SAME, BETTER, DIFFERS = "same", "better", "differs"
 POSE = (

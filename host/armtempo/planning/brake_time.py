@@ -9,6 +9,7 @@ fixed shape.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from armtempo_shared.limits import TICK_HZ
@@ -24,7 +25,6 @@ from armtempo_shared.motion import (
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 from armtempo.model.parts import Limits
 from armtempo.planning.ramp_excess import EXCESS, SHORTEST_S, Ramps, Rates, Shapes, entry_times_s

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import perm
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.planning.fitness import scale_of
 from armtempo.planning.variables import Index
 from armtempo.splines import bspline, extremes, time_axis

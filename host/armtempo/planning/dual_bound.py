@@ -19,10 +19,11 @@ maximises it over splines on cells of u: l quadratic, m linear, n constant. For 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.optimise import interior_point
 from armtempo.optimise.interior_point import Linearised, Schedule
 from armtempo.optimise.kkt import Equalities

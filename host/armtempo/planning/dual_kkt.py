@@ -9,10 +9,11 @@ and the matrix in brackets is banded, as only cells at most two apart share vari
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.planning.variables import Index
 
 _SHARED = 2

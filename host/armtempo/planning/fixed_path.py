@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.model.parts import Limits
 from armtempo.optimise import interior_point
 from armtempo.optimise.interior_point import Schedule

@@ -15,11 +15,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.model.parts import Limits
 from armtempo.splines import bspline
 from armtempo.splines.trajectory import JointSpline, Trajectory

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import ArmtempoError
 from armtempo.model.arm import Arm
 from armtempo.model.pallet import ArmPallet

@@ -7,11 +7,11 @@ acceleration bounds t'', or its jerk t''', which bounds those of the others.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.planning import limit_rows
 from armtempo.planning.collocation import Points
 from armtempo.planning.variables import Index, MotionVariables, derivative_matrix, time_basis

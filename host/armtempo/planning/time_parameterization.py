@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +11,6 @@ from armtempo_shared import motion
 from armtempo_shared.limits import MAX_MOTION_BYTES, MAX_SEGMENTS
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.progress import Progress, stage
 from armtempo.model.job import REFINE, Job
 from armtempo.model.parts import Limits

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.kinematics import chain
 from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.forward import Frame, array_frames

@@ -6,6 +6,7 @@ control points. With a fixed path only the differences vary.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import perm
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.splines import bspline
 
 if TYPE_CHECKING:

@@ -25,11 +25,12 @@ the multipliers are constant for a while, at the t where that costs least, at mo
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.progress import alive
 
 _CELLS = 8

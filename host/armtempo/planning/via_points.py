@@ -15,12 +15,12 @@ A pose that asks for less than the whole orientation is solved for the driven jo
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.kinematics.choice import Choice, choose
 from armtempo.kinematics.constraint import Constraint, Miss

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.report import replayed
 from armtempo.report.differentiation import of_curves
 from armtempo.report.run_folder import COMPLETE

@@ -23,7 +23,7 @@ import json
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import field
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -33,7 +33,6 @@ from armtempo_shared import limits
 from armtempo_shared.sequence import ENDINGS, FINISHED
 
 from armtempo.basics.atomic_file import replace_text
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.basics.installation import installed_version
 from armtempo.link.board_messages import Positions, RowBegun, Sample, SequenceState
@@ -47,6 +46,8 @@ VERSION = 2
 META = "run.json"
 TRAJECTORY = "trajectory.json"
 SEQUENCE = "sequence.json"
+PLANS = TRAJECTORY, SEQUENCE
+"""The file of the plan: of a job, or of a sequence."""
 ARM = "arm.json"
 RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrupted", "fault", "broken"
 ROW_COLUMNS = {

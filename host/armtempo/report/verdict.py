@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from armtempo_shared.sequence import ENDINGS, STOPPED
 from numpy.typing import NDArray
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.model.joint_unit import JointUnit
 from armtempo.model.steps import position, whole_cycles
 from armtempo.report import peaks, replayed

@@ -6,10 +6,9 @@ It is sent to other programs as JSON, so it holds plain values only. It imports 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import LinkError
 from armtempo.model.joint_unit import DEG, MM, JointUnit
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from armtempo_shared import wire
 
 from armtempo.basics import json_codec
 from armtempo.basics.atomic_file import replace_text
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.encoding import encode
 from armtempo.link.client import Client

@@ -17,14 +17,13 @@ from __future__ import annotations
 
 import bisect
 import struct
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import RunFolderError
 
 _RECORD = struct.Struct("<BBBBIq")

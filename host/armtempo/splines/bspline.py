@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from math import comb
 
@@ -12,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.arrays import Array as Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 
 _REST_ROWS: dict[int, tuple[tuple[float, ...], ...]] = {

@@ -8,11 +8,11 @@ that may contain the maximum are halved (branch and bound), which reduces the ga
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.splines import bernstein
 from armtempo.splines.bspline import Array
 from armtempo.splines.trajectory import JointSpline

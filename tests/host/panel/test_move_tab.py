@@ -26,6 +26,7 @@ from tests.host.panel.fakes import ARM, board_state, press, unhomed
 from tests.host.panel.pages import Page, pages
 
 
+@pytest.mark.slow
 def test_a_typed_pose_is_reached_by_the_nearest_posture() -> None:
     here = np.array([10.0, -60.0, 40.0])
     place = forward(ARM, (20.0, -70.0, 50.0))[:3, 3].tolist()

@@ -6,13 +6,12 @@ import json
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from armtempo.basics import json_text
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError
 
 ABOUT = "firmware.json"

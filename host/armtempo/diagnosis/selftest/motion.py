@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from armtempo_shared import motion as motion_record
 from armtempo_shared.limits import STEP_FRACTION_BITS, TICK_FRACTION_BITS, TICK_HZ
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.splines import bspline, time_axis
 from armtempo.splines.trajectory import JointSpline
 

@@ -7,12 +7,12 @@ import time
 from binascii import unhexlify
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
+from dataclasses import dataclass
 from io import StringIO
 from typing import Any
 
 import serial
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import LinkError
 
 _SILENCE_S = 20.0

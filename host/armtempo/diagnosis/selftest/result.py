@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from armtempo.basics.dataclass import dataclass
 from armtempo.diagnosis.finding import Level
 
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.basics.progress import Progress, part
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
+from armtempo.model.leg import Search
 from armtempo.model.parts import Limits
-from armtempo.model.plan import Search
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import board_limits, checks, lower_bounds, through_plan
 from armtempo.planning.fixed_path import FixedPath

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.optimise.kkt import Equalities
 from armtempo.planning.motion_program import mean_slopes
 from armtempo.planning.variables import Index, MotionVariables

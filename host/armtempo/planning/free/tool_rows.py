@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.planning.collocation import Points
 from armtempo.planning.tool import Tool, ToolState
 from armtempo.planning.variables import MotionVariables, angle_basis

@@ -6,10 +6,11 @@ follow, the error says at which place and why.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import PlanError
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.geometry import Geometry

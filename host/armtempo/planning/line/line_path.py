@@ -6,12 +6,12 @@ Each leg from rest to rest is a separate spline: at a rest between two, five con
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.dataclass import dataclass
 from armtempo.basics.errors import PlanError
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job

@@ -366,7 +366,12 @@ def case_the_button_starts_it_but_not_before_homing():
 
 def case_one_that_homes_the_arm_starts_before_that_and_moves_nothing_else():
     row = [0, -1, -990, -1000, 2000, 2050, 30, 30, 120, 1]
-    plan = {"fast": TABLE["limits"], "slow": TABLE["limits"], "groups": [[row]]}
+    plan = {
+        "fast": TABLE["limits"],
+        "slow": TABLE["limits"],
+        "names": [["joint 1", "degrees"], ["joint 2", "degrees"]],
+        "groups": [[row]],
+    }
     world = World(
         "try:\n    cell.goto('there')\nexcept cell.Error as error:\n    print(error)\ncell.home()\n",
         homing=plan,
