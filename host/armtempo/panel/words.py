@@ -297,8 +297,8 @@ def of_job(text: str) -> str:
     """A text on the edited job, with the names of its fields instead of those of the file's keys."""
     text = of_text(text)
     for key, label in {**VIA_KEYS, **OPTIONS}.items():
-        # A key that is a usual word too is one only where a value follows
-        text = re.sub(rf"\b{key}\b" + ("" if "_" in key else "(?= =| ['\"0-9])"), f"‘{label}’", text)
+        # A key that is a usual word too is one only where a value follows, but not in "at line 1"
+        text = re.sub(rf"(?<!at )\b{key}\b" + ("" if "_" in key else "(?= =| ['\"0-9])"), f"‘{label}’", text)
     return text
 
 
