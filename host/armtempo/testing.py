@@ -200,7 +200,7 @@ class _Work:
         file = self._program.motion_file(name)
         if not file.is_file():
             raise InputError(f"no motion {name!r}: {file} does not exist", "plan it")
-        plan = Plan.load(file)
+        plan = Plan.load_motion(file)
         planned_for.check(file, plan, self._arm)
         motion = plan.trajectory
         start = self._arm.transmission.whole_steps(motion(0.0))

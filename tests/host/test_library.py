@@ -17,8 +17,8 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.basics import errors
-from armtempo.encoding import encoded_sequence
-from armtempo.encoding.encoded_sequence import EncodedSequence
+from armtempo.encoding import encoded_plan
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.kinematics import PoseSolver
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Sample
@@ -46,8 +46,8 @@ def test_the_button_starts_an_uploaded_sequence_only_where_asked(
     client: Any = SimpleNamespace(set_default=defaults.append)
     monkeypatch.setattr(arm_state, "configure", lambda *_: None)
     sequence = armtempo.plan_sequence(arm, armtempo.Sequence("pick", (armtempo.Wait(1.0),)))
-    encoded = EncodedSequence("pick", arm, (), (), bytes(4))  # the board takes no row without a step
-    monkeypatch.setattr(encoded_sequence, "of_plan", lambda plan: encoded)
+    encoded = Encoded("pick", arm, (), (), bytes(4))  # the board takes no row without a step
+    monkeypatch.setattr(encoded_plan, "of_plan", lambda *_: encoded)
     monkeypatch.setattr("armtempo.robot.store.store", lambda *_: None)
     board = armtempo.Board(client, "pipe")
     board.upload_sequence(sequence)
@@ -248,7 +248,7 @@ def test_an_arm_and_a_sequence_are_made_in_code() -> None:
     assert [row.words for row in planned.rows if row.words.startswith("output")] == 2 * [
         "output gripper closed"
     ]
-    record = encoded_sequence.of_plan(planned)  # the board takes no row without a step
+    record = encoded_plan.of_plan(planned)  # the board takes no row without a step
     assert record.rows[-1].step == 6
     assert [step.step for step in sequence.steps] == [1, 6]
     with pytest.raises(armtempo.InputError, match="no output 'griper'"):

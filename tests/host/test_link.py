@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from armtempo.basics.errors import BoardError, LinkError
-from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_plan import MotionKey
 from armtempo.link import Client
 from armtempo.link.client import harmless_number
 from armtempo.link.follow import MotionFollower

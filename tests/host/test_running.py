@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from armtempo.basics.errors import LinkError
-from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_plan import MotionKey
 from armtempo.robot.running import on_board
 from armtempo_shared import wire
 from armtempo_shared.messages import ONCE_NAME

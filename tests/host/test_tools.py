@@ -290,7 +290,7 @@ def test_a_sequence_begins_with_its_tool(tmp_path: Path) -> None:
         found = planned(arm, f'tool = "gripper"\n{text}', tmp_path)
         assert found.arm.tool == arm.tools[0]
         assert len(found.legs) == 2
-        end = forward(found.arm, found.legs[1](found.legs[1].duration_s))[:3, 3]
+        end = forward(found.arm, found.legs[1].trajectory(found.legs[1].trajectory.duration_s))[:3, 3]
         np.testing.assert_allclose(end, there, atol=0.1)
 
 

@@ -15,7 +15,7 @@ from armtempo import testing
 from armtempo.basics.errors import InputError, LinkError, PlanError
 from armtempo.deploy import program_files
 from armtempo.diagnosis.arm_check import check_arm
-from armtempo.encoding import encode, encoded_motion, encoded_program
+from armtempo.encoding import encode, encoded_plan, encoded_program
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.of_arm import forward
 from armtempo.link import Client
@@ -253,7 +253,7 @@ class Record(ProgramRecord):
 def test_the_record_has_the_arms_names(tmp_path: Path) -> None:
     found = UserProgram.load(written("cell.goto('home')\ncell.count('n')\ncell.run('m')\n", tmp_path), ARM)
     assert (found.postures, found.counters, found.motions) == ({"home": 2}, {"n": 3}, {"m": 4})
-    motion = encoded_motion.of_plan(Plan.load(small_plan(tmp_path / "m.json")), "m")
+    motion = encoded_plan.of_plan(Plan.load(small_plan(tmp_path / "m.json")), "m")
     encoded = encoded_program.of_program(found, ARM, (motion,))
     record = Record(encoded.data)
     table = record.table()

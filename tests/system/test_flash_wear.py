@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.encoding import encode, encoded_motion
-from armtempo.encoding.encoded_motion import EncodedMotion
+from armtempo.encoding import encode, encoded_plan
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.robot.connect import connect
@@ -33,10 +33,10 @@ def test_it_writes_the_blocks_that_micropythons_own_writes(case: scripted.Case, 
     case.run(str(seed))
 
 
-def way(name: str, *by_deg: list[float]) -> EncodedMotion:
+def way(name: str, *by_deg: list[float]) -> Encoded:
     """A short motion between two postures, given by their distances from home."""
     start, end = (HOME_DEG + np.array(away) for away in by_deg)
-    return encoded_motion.of_trajectory(point_to_point.straight(name, start, end, ARM), ARM)
+    return encoded_plan.of_trajectory(point_to_point.straight(name, start, end, ARM), ARM)
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def day(tmp_path: Path) -> Path:
         "near": way("near", far, home).data,
         "feed": feed.data,
         "food": way("feed", home, [0.1, 0.1, 0.1]).data,
-        "way": encoded_motion.way_back(feed),
+        "way": encoded_plan.way_back(feed),
     }
     for number in range(2):
         safety = replace(ARM.safety, link_timeout_ms=ARM.safety.link_timeout_ms + 1 + number)

@@ -61,7 +61,7 @@ def test_cycles_lead_back_to_the_step(name: str, tmp_path: Path) -> None:
     grips = [pulses.tick for pulses in power.pulses[GRIPPER] if pulses.high_ticks == closed]
     for cycle, grip in enumerate(grips):  # between the end of the first motion and the start of the next
         begun = power.starts[LEGS * cycle]
-        assert begun + plan.legs[0].duration_s * TICK_HZ < grip < power.starts[LEGS * cycle + 1]
+        assert begun + plan.legs[0].trajectory.duration_s * TICK_HZ < grip < power.starts[LEGS * cycle + 1]
     assert len(sequences.pauses_s(power, plan)) == CYCLES - 1
 
 

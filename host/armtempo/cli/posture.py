@@ -19,10 +19,10 @@ from armtempo.cli.typed_pose import TypedPose
 from armtempo.model import via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
-from armtempo.model.sequence_plan import AnyPlan
 from armtempo.model.tool_pose import BASE, Pose
 from armtempo.planning import point_to_point, via_points
 from armtempo.robot.board import Board
@@ -163,7 +163,7 @@ class NamedPosture:
     text: str
     arm: Arm | None
     """The arm that is set, else the arm of the plan; None: the arm that the board is set up for."""
-    plan: AnyPlan | None
+    plan: Plan | None
     """Of the file."""
 
     @classmethod

@@ -10,7 +10,7 @@ from armtempo.basics.errors import InputError
 from armtempo.cli import options, programs, resolve, results, sequences
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.run_progress import RunProgress, repetition_line
-from armtempo.encoding.encoded_sequence import Encoded
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.model.plan import Plan
 from armtempo.report import text_summary
 from armtempo.report.run import Run
@@ -34,31 +34,30 @@ def run(what: str, repeat: int, percent: float, force: bool, out: Path | None, g
     there too.
     """
     plan = resolve.load_plan(Path(what), given.arm_path, given.altered) if resolve.is_file(what) else None
-    if plan and plan.is_sequence:
-        _refuse_repeat(repeat)
+    is_sequence = plan is not None and plan.is_sequence
+    _refuse_repeat(repeat, is_sequence)
     named = plan.arm if plan else resolve.named_arm(given.arm_path)
     with resolve.board(given, named) as board:
         arm = resolve.arm_of_board(board, named)
         board.configure(arm, replace=given.replace_arm)
         results.progress_printer(given.as_json)(f"arm: {resolve.describe_arm(arm)}")
         stored = board.client.find(what) if plan is None else None
-        if stored and (stored.sequence or stored.program):
-            _refuse_repeat(repeat)
-        motion = board.upload(plan, replace=force) if plan and not plan.is_sequence else what
+        is_program = stored is not None and stored.program
+        is_sequence = is_sequence or (stored is not None and stored.sequence)
+        _refuse_repeat(repeat, is_sequence or is_program)
+        motion = board.upload(plan, replace=force) if plan else what
         board.speed(percent / 100)
-        if stored and stored.program:
+        if is_program:
             programs.run_and_report(board, what, given.as_json)
-        elif plan and plan.is_sequence:
-            sequences.run_and_report(board, plan, force, resolve.runs(out), given.as_json)
-        elif stored and stored.sequence:
-            sequences.run_and_report(board, what, force, resolve.runs(out), given.as_json)
+        elif is_sequence:
+            sequences.run_and_report(board, motion, resolve.runs(out), given.as_json)
         else:
             run_and_report(board, motion, repeat, resolve.runs(out), given.as_json)
 
 
-def _refuse_repeat(repeat: int) -> None:
+def _refuse_repeat(repeat: int, has_its_own: bool) -> None:
     """Raise InputError for --repeat, which a sequence or program does not have."""
-    if repeat != 1:
+    if repeat != 1 and has_its_own:
         raise InputError(
             "--repeat: not for a sequence or program", "leave it out; it has its own repeat or loops"
         )

@@ -12,7 +12,7 @@ from armtempo_shared.limits import TICK_HZ
 from armtempo.basics.arrays import Array
 from armtempo.cli import results
 from armtempo.cli.results import ProgressBar
-from armtempo.encoding.encoded_sequence import Encoded
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link.board_messages import Sample
 from armtempo.report.run_folder import Repetition, RunFolder
 from armtempo.robot.recording import Watcher
@@ -31,7 +31,7 @@ class RunProgress(Watcher):
 
     def begin(self, motion: Encoded, folder: RunFolder) -> None:
         """Print the motion and its run folder."""
-        (self._motion,) = motion.motions  # sequences are shown by their states
+        self._motion = motion  # sequences are shown by their states
         self._started_s = time.monotonic()
         self._say(
             f"{motion.name}: {self._motion.trajectory.duration_s:.3f} s, into {folder.path}{self._where}"

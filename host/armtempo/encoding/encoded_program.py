@@ -12,8 +12,8 @@ from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError, PlanError
-from armtempo.encoding import encode, encoded_motion, planned_for
-from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
+from armtempo.encoding import encode, encoded_plan, planned_for
+from armtempo.encoding.encoded_plan import Encoded, MotionKey
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.of_arm import forward
 from armtempo.model import home_switches
@@ -38,7 +38,7 @@ class EncodedProgram:
 
     program: UserProgram
     arm: Arm
-    motions: tuple[EncodedMotion, ...]
+    motions: tuple[Encoded, ...]
     """Those that are uploaded with it."""
     data: bytes
     """The program record (layout: ``armtempo_shared.program``)."""
@@ -60,17 +60,17 @@ class EncodedProgram:
         return program.needed_bytes(len(self.program.marked.encode()), bool(self.program.homes))
 
 
-def motions_beside(found: UserProgram, arm: Arm) -> tuple[EncodedMotion, ...]:
+def motions_beside(found: UserProgram, arm: Arm) -> tuple[Encoded, ...]:
     """The motions that a program names and whose plans are beside it; InputError for one that does not fit the arm."""
     files = {name: found.motion_file(name) for name in found.motions}
-    plans = {name: Plan.load(file) for name, file in files.items() if file.is_file()}
+    plans = {name: Plan.load_motion(file) for name, file in files.items() if file.is_file()}
     for name, plan in plans.items():
         planned_for.check(files[name], plan, arm)
-    return tuple(encoded_motion.of_plan(plan, name) for name, plan in plans.items())
+    return tuple(encoded_plan.of_plan(plan, name) for name, plan in plans.items())
 
 
 def of_program(
-    found: UserProgram, arm: Arm, motions: tuple[EncodedMotion, ...] = (), stored: tuple[MotionKey, ...] = ()
+    found: UserProgram, arm: Arm, motions: tuple[Encoded, ...] = (), stored: tuple[MotionKey, ...] = ()
 ) -> EncodedProgram:
     """Encode a program for ``arm``; ``stored``: motions that it runs and the board has.
 
@@ -242,7 +242,7 @@ def _touching(found: EncodedProgram, arm: Arm, tool: str) -> list[str]:
         except ArmtempoError:
             continue  # the program cannot go there with this tool
     for motion in found.motions:
-        ends[f"the start of {motion.name!r}"] = motion.start_deg
+        ends[f"the start of {motion.name!r}"] = motion.trajectory(0.0)
         ends[f"the end of {motion.name!r}"] = motion.trajectory(motion.trajectory.duration_s)
     names = [*ends]
     moves = [

@@ -22,7 +22,7 @@ from armtempo.basics.errors import InputError
 from armtempo.model import frame
 from armtempo.model.arm import Arm
 from armtempo.model.parts import NOTHING, Joint
-from armtempo.model.sequence_plan import AnyPlan
+from armtempo.model.plan import Plan
 from armtempo.planning import workspace_check
 from armtempo.planning.workspace_check import Bodies
 
@@ -38,11 +38,11 @@ _DECIMALS = 6
 """Of lengths in mm: a frame within others is a product of matrices."""
 
 
-def of_plan(plan: AnyPlan) -> MadeWith:
+def of_plan(plan: Plan) -> MadeWith:
     """What a plan was made with."""
     keys = [f"frame {name}" for name in plan.frames]
     keys += [f"tool {on.tool.name}" for on, _ in plan.loaded_legs if on.tool]
-    keys += [f"load {name}" for name in plan.loads if name not in ("", NOTHING)]
+    keys += [f"load {leg.load}" for leg in plan.legs if leg.load not in ("", NOTHING)]
     keys += [f"pallet {name}" for name in plan.pallets]
     keys += [ROWS, WORKSPACE]  # last, as its boxes may be in the frames
     return {key: _checksum(plan.arm, key) or 0 for key in dict.fromkeys(keys)}

@@ -8,10 +8,10 @@ from armtempo.basics.errors import InputError
 from armtempo.encoding import made_with
 from armtempo.encoding.encode import arm_record
 from armtempo.model.arm import Arm
-from armtempo.model.sequence_plan import AnyPlan
+from armtempo.model.plan import Plan
 
 
-def check(what: Path | str, plan: AnyPlan, arm: Arm) -> None:
+def check(what: Path | str, plan: Plan, arm: Arm) -> None:
     """Raise InputError if a plan, named ``what``, is for another arm, or old as in ``check_surroundings``."""
     if arm_record(plan.arm) != arm_record(arm):
         raise InputError(
@@ -20,7 +20,7 @@ def check(what: Path | str, plan: AnyPlan, arm: Arm) -> None:
     check_surroundings(what, plan, arm)
 
 
-def check_surroundings(what: Path | str, plan: AnyPlan, arm: Arm) -> None:
+def check_surroundings(what: Path | str, plan: Plan, arm: Arm) -> None:
     """Raise InputError if something that a plan was made with has changed since."""
     if change := made_with.changed(made_with.of_plan(plan), arm, plan.arm):
         raise InputError(f"{what} is old: {change}, in {_named(arm)}", "plan it again with this arm")

@@ -106,6 +106,8 @@ class LiveArm:
         """When the board last said where the arm is."""
         self.guided = False
         """Whether it is guided by hand."""
+        self.held = False
+        """Whether it moves as long as a button is held: that it brakes then is no pause."""
         self.sought = False
         """Whether it is homed by its switches: the board counts from where it only assumes the joints to be."""
         self.doubt = ""

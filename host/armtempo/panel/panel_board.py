@@ -16,7 +16,6 @@ from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link.traffic import Sink
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.panel import words
 from armtempo.panel.board_link import BoardLink
 from armtempo.panel.job_editor import JobEditor
@@ -275,7 +274,7 @@ class PanelBoard(BoardLink):
         self.live.plan = plan
         self.board.run(plan, times, self.runs, self.part, stop=self._stop)
 
-    def run_sequence(self, sequence: SequencePlan | str) -> None:
+    def run_sequence(self, sequence: Plan | str) -> None:
         """Run a planned sequence, stored in the place of another one of its name; or the stored one of that name."""
         take = self.live.take_sequence
         take(self.board.run_sequence(sequence, take, self._stop, replace=True, out=self.runs))

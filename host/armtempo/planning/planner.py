@@ -16,6 +16,7 @@ from armtempo.basics.installation import installed_version
 from armtempo.basics.progress import Progress, watched
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.leg import JobSolution
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.model.tool_segment import ToolSegment
@@ -64,7 +65,7 @@ def plan(arm: Arm, job: Job, progress: Progress | None = None) -> Plan:
     speeds_deg_s = np.array([each.speed_deg_s for each in reached])
     workspace_check.check_plan(holding, trajectory, speeds_deg_s, job.start_touches)
     notes = (*checks.hardware_notes(arm), *notes, *planned.notes, *_swing_note(arm, job, trajectory))
-    return Plan(arm, job, via, notes, trajectory, planned.searches, reached, versions())
+    return Plan.of_job(arm, JobSolution(job, via, planned.searches, reached), trajectory, notes, versions())
 
 
 def _swing_note(arm: Arm, job: Job, trajectory: Trajectory) -> list[str]:

@@ -63,7 +63,7 @@ class Board:
         """Where the arm is."""
         self.io = BoardIO(self._shared)
         """Outputs and inputs."""
-        self.motions = Motions(self._shared, self.store)
+        self.motions = Motions(self._shared)
         """What moves the arm, and what it recorded."""
         self.programs = Programs(self._shared)
         """Users' programs."""

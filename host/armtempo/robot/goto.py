@@ -12,21 +12,21 @@ from numpy.typing import ArrayLike
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion
-from armtempo.encoding.encoded_sequence import Encoded
+from armtempo.encoding import encoded_plan
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Followed, MotionFollower
 from armtempo.model.arm import Arm
-from armtempo.model.sequence_plan import AnyPlan, load_plan
+from armtempo.model.plan import Plan
 from armtempo.planning import point_to_point, via_points, workspace_check
 from armtempo.ports.names import is_sim
 from armtempo.robot import arm_state, running
-from armtempo.robot.running import attended, follow, nothing, raise_fault
+from armtempo.robot.running import attended, follow, nothing, raise_failure
 from armtempo.robot.stop_request import StopRequest
 from armtempo.splines.trajectory import Trajectory
 
-Where = AnyPlan | Encoded | Path | str | ArrayLike
+Where = Plan | Encoded | Path | str | ArrayLike
 """A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
 (or of its file) or sequence."""
 _NAME = "goto"
@@ -58,7 +58,7 @@ def go_to(
     if not arm_state.is_at(client, arm, target_deg):
         here = arm_state.posture_deg(client, arm)
         trajectory = motion(arm, here, target_deg, pace or MovePace())
-        data = encoded_motion.of_trajectory(trajectory, arm).data
+        data = encoded_plan.of_trajectory(trajectory, arm).data
         move_once(client, data, stop, _shown(progress, trajectory.duration_s))
 
 
@@ -84,7 +84,7 @@ def move_once(
     """Run a motion record once; raises BoardError if a fault ends it."""
     with running.on_board(client, data) as key, attended(client, stop):
         end = follow(client, stop, MotionFollower(client, client.start(key.name, key.crc)), take).end
-    raise_fault(end)
+    raise_failure(client, end)
 
 
 def _shown(progress: Progress | None, duration_s: float) -> Callable[[Followed], object]:
@@ -131,8 +131,8 @@ def posture_deg(where: Where, arm: Arm) -> Array:
     Raises InputError for an unknown name, or a posture that does not fit the arm.
     """
     if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
-        where = load_plan(where)
-    if isinstance(where, AnyPlan | Encoded):
+        where = Plan.load(where)
+    if isinstance(where, Plan | Encoded):
         start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
         return point_to_point.posture(start_deg, where.arm)
     if isinstance(where, str):

@@ -17,7 +17,7 @@ from armtempo_shared.homing import ON_THE_WAY, Homing
 from armtempo_shared.messages import START_HOMING, START_SEEKS, START_SWITCHES_BIT
 
 from armtempo.basics.errors import InputError, LinkError
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_plan
 from armtempo.link import Client
 from armtempo.link.follow import MotionFollower
 from armtempo.model import home_switches
@@ -26,7 +26,7 @@ from armtempo.model.home_switches import HomeSwitch
 from armtempo.model.parts import Limits
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
-from armtempo.robot.running import attended, follow, on_board, raise_fault
+from armtempo.robot.running import attended, follow, on_board, raise_failure
 from armtempo.robot.stop_request import StopRequest
 
 HomingProgress = Callable[[str, int, int], object]
@@ -182,13 +182,13 @@ class _GroupHoming(Homing):
             start_deg[index], end_deg[index] = starts[index], ends[index]
         slow_arm = _slowed(self._arm, home_switches.SLOW if is_slow else home_switches.FAST)
         trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
-        motion = encoded_motion.of_trajectory(trajectory, self._arm)
+        motion = encoded_plan.of_trajectory(trajectory, self._arm)
         flags = self._flags(starts) | START_SEEKS * seeks
         with on_board(self._client, motion.data) as key, attended(self._client, self._stop):
             follower = MotionFollower(self._client, self._client.start(key.name, key.crc, flags))
             end = follow(self._client, self._stop, follower).end
         tripped = self._client.status().fault_joint
-        raise_fault(end)
+        raise_failure(self._client, end)
         self._stop.check()
         ends_deg = self._arm.transmission.angles_of_steps(end.positions.commanded_steps)
         self._ends_deg = {index: float(ends_deg[index]) for index in starts}

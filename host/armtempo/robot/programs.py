@@ -11,7 +11,7 @@ from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
 from armtempo.encoding import encoded_program, made_with
-from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_plan import MotionKey
 from armtempo.encoding.encoded_program import EncodedProgram
 from armtempo.link import Client
 from armtempo.link.board_messages import Notice, SequenceState

@@ -10,7 +10,7 @@ from armtempo_shared import wire
 from armtempo_shared.messages import ONCE_NAME
 
 from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
-from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_plan import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import SequenceState
 from armtempo.link.follow import CHECK_S, Followed, Follower, RunEnd, where
@@ -187,9 +187,11 @@ def fault_name(code: int) -> str:
     return wire.ERRORS.get(code, (f"code {code}",))[0] if code else ""
 
 
-def raise_fault(end: RunEnd) -> None:
-    """Raise BoardError, with the text of the fault, if a fault ended the run."""
-    if end.fault:
+def raise_failure(client: Client, end: RunEnd | SequenceState) -> None:
+    """Raise BoardError if a fault ended a run, or the board refused a motion of its sequence."""
+    if isinstance(end, SequenceState):
+        raise_sequence_failure(client, end)
+    elif end.fault:
         said = "".join(f"; the board says: {text.strip()}" for text in readable(end.notices))
         raise refusal(f"a fault ended the motion{said}", end.fault, end.fault_joint)
 

@@ -105,6 +105,22 @@ def test_cycles_are_counted_from_one(operator: PanelBoard, ending: str, cycle: i
         assert said in page.texts()
 
 
+def test_another_kind_of_a_step_builds_its_row_alone_anew(operator: PanelBoard, tmp_path: Path) -> None:
+    """In the others a list may be open, which would close."""
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    operator.sequences.open("day.toml")
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        kinds = [page.named(f"{words.STEP} {number}") for number in (1, 2, 3, 4)]
+        kinds[2].set_value("output")
+        page.look()
+        again = [page.named(f"{words.STEP} {number}") for number in (1, 2, 3, 4)]
+        assert [one is other for one, other in zip(kinds, again, strict=True)] == [True, True, False, True]
+        assert page.named(f"step 3: {words.STEP_KEYS['to']}").value == ""
+        page.act(lambda: [connected() for connected in page.client.connect_handlers])
+        assert page.named(f"{words.STEP} 1") is kinds[0]
+
+
 def test_what_is_typed_on_into_a_step_that_was_just_taken_stays(operator: PanelBoard, tmp_path: Path) -> None:
     (tmp_path / "day.toml").write_text(SEQUENCE)
     operator.sequences.open("day.toml")

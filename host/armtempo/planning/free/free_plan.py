@@ -11,8 +11,8 @@ from armtempo.basics.errors import InputError, PlanError
 from armtempo.basics.progress import Progress, part
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
+from armtempo.model.leg import Search
 from armtempo.model.parts import Limits
-from armtempo.model.plan import Search
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import board_limits, checks, lower_bounds, through_plan
 from armtempo.planning.fixed_path import FixedPath

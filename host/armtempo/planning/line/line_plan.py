@@ -14,8 +14,8 @@ from armtempo.basics.progress import Progress, part, stage
 from armtempo.model import tool_segment
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, Job
+from armtempo.model.leg import Search
 from armtempo.model.parts import Limits
-from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.fixed_path import Along, FixedPath, Optimum
 from armtempo.planning.free.angle_bounds import of_path
