@@ -15,7 +15,7 @@ from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
-from armtempo.model.parts import DrivenJoint
+from armtempo.model.parts import END_STEPS, DrivenJoint
 from armtempo.planning import brake_time, move_law, point_to_point, workspace_check
 from armtempo.planning.brake_time import BrakeTimes
 from armtempo.planning.move_law import DEGREE, MoveLimits
@@ -213,8 +213,8 @@ def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
     """
     low, high = joint.travel_deg
     wanted = here + by
-    if low <= wanted <= high:
-        return wanted, ""
+    if (low - wanted) * joint.steps_per_deg <= END_STEPS >= (wanted - high) * joint.steps_per_deg:
+        return min(max(wanted, low), high), ""
     at_end = f"{joint.name} is at {joint.end_of_travel('high' if by > 0 else 'low')}"
     edge = min(high, wanted) if by > 0 else max(low, wanted)
     scale = joint.steps_per_deg
