@@ -25,7 +25,6 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.steps import EachPlace, ToPlace
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner, point_to_point, via_points
-from armtempo.planning.pallet_places import resolve
 from armtempo.robot import store
 
 ARM_TEXT = shipped.find("ar4").path.read_text(encoding="utf-8")
@@ -266,7 +265,7 @@ def test_the_solutions_of_all_places_are_near_each_other() -> None:
     ar4 = Arm.load("ar4")
     first = Pose.of_matrix(forward(ar4, [10, 10, 20, 170, 40, -150]))
     pallet = ArmPallet("tray", first, rows=3, columns=3, row_mm=20.0, column_mm=-15.0)
-    above = np.array([place.above_deg for place in resolve(ar4, pallet)])
+    above = np.array([place.above_deg for place in via_points.places(ar4, pallet)])
     assert np.abs(np.diff(above, axis=0)).max() < 30.0
 
 

@@ -25,7 +25,7 @@ from armtempo.model.parts import DrivenJoint
 from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME
 from armtempo.model.user_program import UserProgram
-from armtempo.planning import pallet_places, point_to_point, via_points, workspace_check
+from armtempo.planning import point_to_point, via_points, workspace_check
 
 Places = dict[str, dict[str, list[tuple[Array, Array]]]]
 """By pallet and tool: the driven joints' angles above each place and at it, degrees, (J,) each."""
@@ -193,7 +193,7 @@ def _shapes(arm: Arm, places: Places) -> dict[str, list[Any]]:
 def _places(arm: Arm, pallet: ArmPallet) -> list[tuple[Array, Array]]:
     """The joints' angles above each place and at it, the solution nearest to those above: degrees, (J,) each."""
     found = []
-    for place in pallet_places.resolve(arm, pallet):
+    for place in via_points.places(arm, pallet):
         try:
             at = via_points.nearest(arm, place.pose, place.above_deg)
         except ArmtempoError as error:

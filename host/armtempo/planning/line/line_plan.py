@@ -20,7 +20,6 @@ from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.fixed_path import Along, FixedPath, Optimum
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import legs as cut
-from armtempo.planning.line.between import between
 from armtempo.planning.line.deviation import LineDeviation
 from armtempo.planning.line.follow import passed
 from armtempo.planning.line.line_path import (
@@ -30,6 +29,7 @@ from armtempo.planning.line.line_path import (
     LinePath,
     Proven,
     TimedPath,
+    between,
     led_legs,
     proven_paths,
 )
