@@ -309,6 +309,13 @@ def test_at_the_end_of_the_range_only_the_way_back_is_open() -> None:
     assert back.end_deg[1] == pytest.approx(end[1] - 1.0)
 
 
+def test_a_jog_to_the_end_of_the_range_does_not_end_early() -> None:
+    """Also to a hundredth of a step beyond it, which is the end."""
+    for to_deg, ends in ((190.0, ""), (190.0001, ""), (-10.0001, ""), (190.001, "joint 1 is at the end of")):
+        motion = jog_motion.plan("x", PAPER, [0.0, -60.0, 40.0], JogMove(to_deg, joint=0))
+        assert motion.ends[:24] == ends
+
+
 def test_no_move_by_hand_goes_on_to_a_switch_within_the_range() -> None:
     switches = LimitSwitches(low=1, low_deg=-1.0, high="PD0", high_deg=5.0)
     arm = replace(PAPER, joints=(replace(PAPER.joints[0], switches=switches), *PAPER.joints[1:]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import random
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +22,6 @@ from armtempo.robot import goto
 from click.testing import CliRunner
 
 from tests.host import made_runs
-from tests.host.test_record import spoil_json, spoil_table
 
 VERSION_1 = Path(__file__).with_name("runs_of_version_1")
 """A motion and a sequence, as armtempo of version 1 of the format had recorded them."""
@@ -175,30 +173,6 @@ def test_a_sequence_is_run_and_gone_to_as_a_motion_is(tmp_path: Path) -> None:
     board: Any = None
     with pytest.raises(InputError, match="a sequence takes no repeat"):
         armtempo.Board(board, "port").run(tmp_path / "pick.json", repeat=2)
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_a_damaged_folder_is_read_or_refused_in_words(
-    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    seed = 38
-    print("seed", seed)
-    numbers = random.Random(seed)
-    made_runs.draw_nothing(monkeypatch)
-    told = 0
-    for number in range(40):
-        folder = shutil.copytree(recorded, tmp_path / "damaged", dirs_exist_ok=True)
-        name = numbers.choice(("run.json", "run.json", "samples-01.csv", "rows-01.csv"))
-        (spoil_json if name.endswith("json") else spoil_table)(folder / name, numbers)
-        try:
-            run = armtempo.Run.load(folder)
-            if number % 10 == 0:
-                run.report()
-            told += any(one.problem for one in run.repetitions)
-        except ArmtempoError:
-            told += 1
-    assert told > 10
 
 
 # version 1: a motion had its record in motion.bin, a sequence its samples in samples.csv

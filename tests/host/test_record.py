@@ -257,19 +257,25 @@ def spoil_table(path: Path, numbers: random.Random) -> None:
 
 @pytest.mark.long
 @pytest.mark.slow
+@pytest.mark.parametrize("of_sequence", [False, True])
 def test_a_damaged_run_folder_is_read_or_refused_in_words(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of_sequence: bool
 ) -> None:
     """Random damage to each of its files: no traceback, no number that is none."""
     seed = 37
     print("seed", seed)
     numbers = random.Random(seed)
     made_runs.draw_nothing(monkeypatch)
-    whole = made_runs.make(tmp_path / "whole", repetitions=2)
+    if of_sequence:
+        whole, cases = made_runs.make_sequence(tmp_path / "whole"), 40
+    else:
+        whole, cases = made_runs.make(tmp_path / "whole", repetitions=2), 120
     refused = 0
-    for number in range(120):
+    for number in range(cases):
         folder = shutil.copytree(whole, tmp_path / "damaged", dirs_exist_ok=True)
-        name = numbers.choice(("run.json", "samples-01.csv", "samples-02.csv"))
+        name = numbers.choice(
+            ("run.json", "samples-01.csv", "rows-01.csv" if of_sequence else "samples-02.csv")
+        )
         (spoil_json if name.endswith("json") else spoil_table)(folder / name, numbers)
         try:
             found = run_reader.load(folder)
@@ -283,7 +289,7 @@ def test_a_damaged_run_folder_is_read_or_refused_in_words(
                 run_report.write(folder)
         except ArmtempoError:
             refused += 1
-    assert refused > 40
+    assert refused > cases // 4
 
 
 def test_two_runs_at_once_get_folders_of_their_own(tmp_path: Path) -> None:

@@ -24,7 +24,8 @@ from armtempo.planning import board_limits, checks, planner, point_to_point, tor
 from armtempo.planning.jog import jog_motion
 from armtempo.report import evaluation, run_folder, run_reader, run_report, verdict
 from armtempo.report.run import Run
-from armtempo.robot import arm_state
+from armtempo.robot import arm_state, goto
+from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import armrecord, limits, motion
 
 from tests.host import made_runs
@@ -118,6 +119,19 @@ def test_unmeasured_motors_leave_joints_unmeasured() -> None:
     assert [gears.is_alone(joint) for joint in range(3)] == [True, False, True]
     assert gears.count_deg[0] == 0.25
     assert np.isnan(gears.count_deg[1])
+
+
+def test_a_goto_asks_for_the_position_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, moved = [], []
+
+    def status() -> Known:
+        asked.append(1)
+        return Known(SimpleNamespace(commanded_steps=tuple(PAPER.transmission.whole_steps(PAPER.home_deg))))
+
+    monkeypatch.setattr(goto, "move_once", lambda *given: moved.append(given))
+    there = np.array(PAPER.home_deg) + 5.0
+    goto.go_to(SimpleNamespace(status=status), PAPER, there, StopRequest())  # type: ignore[arg-type]
+    assert (len(asked), len(moved)) == (1, 1)
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -62,6 +62,13 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
     [
         ("x = = 1\n", 2, "invalid syntax"),
         ("\ncell.goto('hom')\n", 3, "no posture 'hom'"),
+        ("cell.goto((0, -50))\n", 2, r"\(0, -50\) is no posture"),
+        ("cell.goto([0, 'up', 30])\n", 2, "is no posture"),
+        (
+            "cell.goto(posture=(0, 1e3, 30), speed=0.3)\n",
+            2,
+            "joint 2 at 1000 degrees is outside of its range",
+        ),
         ("cell.move('home')\n", 2, "the cell has no 'move'"),
         ("cell.at(3)\n", 2, "the cell has no 'at'"),
         ("cell.goto()\n", 2, "missing a required argument"),
@@ -445,7 +452,7 @@ def test_what_a_program_raises_passes_and_endless_ones_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(CellError, match="joint 2 would leave its range"):
-        testing.run(written("cell.goto([0, 300, 0])\n", tmp_path), ARM)
+        testing.run(written("there = [0, 300, 0]\ncell.goto(there)\n", tmp_path), ARM)
     with pytest.raises(InputError, match="does not exist"):
         testing.run(written("cell.run('none')\n", tmp_path), ARM)
     small_plan(tmp_path / "other.json")

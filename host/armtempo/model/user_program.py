@@ -20,6 +20,7 @@ from armtempo_shared.sequence import MAX_COUNTERS
 
 from armtempo.basics import number_table
 from armtempo.basics.errors import InputError
+from armtempo.basics.kinds import is_number
 from armtempo.basics.text import did_you_mean
 from armtempo.model import home_switches, program_calls
 from armtempo.model.arm import Arm
@@ -29,6 +30,8 @@ from armtempo.model.parts import NOTHING
 _PACKAGE, _CELL = "armtempo_board", "cell"
 _CALLS = {name: value for name, value in vars(Cell).items() if not name.startswith("_")}
 _INTERNAL = ("at", "each")
+_LEAST_BEYOND_STEPS = 1.0
+"""The board rounds to whole steps: what is less beyond a range may be its end."""
 
 
 @dataclass(frozen=True)
@@ -153,6 +156,8 @@ class _Reader:
                 raise InputError(f"{self._place(node)}{error.problem}", error.hint) from None
             self.homes = self.homes or node.lineno
         first = next(iter(given.values()), None)
+        if name == "goto" and isinstance(first, ast.Tuple | ast.List):
+            self._check_posture(first)
         if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
             return
         text = first.value
@@ -178,6 +183,27 @@ class _Reader:
                 self._check_output(text, given.get("value"))
         except InputError as error:
             raise InputError(f"{self._place(node)}{error.problem}", error.hint) from None
+
+    def _check_posture(self, node: ast.Tuple | ast.List) -> None:
+        """Of numbers that are in the text; others the board checks."""
+        try:
+            angles = ast.literal_eval(node)
+        except ValueError:
+            return
+        joints = self.arm.driven
+        if len(angles) != len(joints) or not all(is_number(angle) for angle in angles):
+            raise InputError(
+                f"{self._place(node)}{ast.unparse(node)} is no posture",
+                f"it has a number for each of {', '.join(joint.name for joint in joints)}",
+            )
+        for joint, angle in zip(joints, angles, strict=True):
+            low, high = joint.range_deg
+            if not low <= joint.placed(angle, _LEAST_BEYOND_STEPS) <= high:
+                raise InputError(
+                    f"{self._place(node)}{joint.name} at {angle:g} {joint.unit.word} is outside of its range {low:g} "
+                    f"to {high:g}",
+                    "stay within it",
+                )
 
     def _check_output(self, name: str, value: ast.expr | None) -> None:
         output = self.arm.outputs[self.arm.output(name)]

@@ -65,11 +65,11 @@ class JobEditor(FileEditor):
         return f'name = "{name}"\n{self.arm.texts.list_key("via_deg")} = [\n    [{row}],\n    [{row}],\n]\n'
 
     def is_one(self, path: Path) -> bool:
-        """Whether a file describes a job."""
+        """Whether a file describes a job, or is no TOML."""
         try:
             table = toml_table.read(path)
         except InputError:
-            return False
+            return True
         listed = any(table.has(key) for key in ("via", _LIST, NEUTRAL[_LIST]))
         return table.has("name") and listed and not table.has("joint")
 

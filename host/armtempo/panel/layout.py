@@ -109,7 +109,9 @@ def _views(page: PanelPage) -> None:
         frames.on_value_change(
             lambda event: ui.run_javascript(f"armtempo.show_frames({json.dumps(event.value)})")
         )
+    scale = ", ".join(f"rgb({255 * r:.0f} {255 * g:.0f} {255 * b:.0f})" for r, g, b in arm_scene.SLOW_TO_FAST)
     page.speeds = ui.label("").classes("armtempo-speed-scale")
+    page.speeds.style(f"background-image: linear-gradient(to right, {scale})")
     page.speeds.set_visibility(False)
     page.live_label("armtempo-unknown")
 

@@ -62,7 +62,7 @@ def state_line(operator: PanelBoard) -> str:
     kind = f" ({words.VIRTUAL})" if state.virtual else ""
     name = state.state
     if state.moving and not state.speed_percent:
-        name = words.PAUSED
+        name = state.state if operator.live.held else words.PAUSED
     elif state.moving and state.speed_percent != 100:
         name += f" {words.AT_SPEED.format(percent=state.speed_percent)}"
     fault = f" · {state.fault}" if state.fault else ""

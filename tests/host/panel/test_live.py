@@ -96,6 +96,8 @@ def test_a_picture_of_an_arm_that_is_not_heard_says_how_old_it_is(operator: Pane
 def test_a_pause_is_named_as_one(operator: PanelBoard) -> None:
     operator.live.state = board_state(state="moving", moving=True, speed_percent=0.0)
     assert live_texts.state_line(operator).startswith("paused")
+    operator.live.held = True  # a jog that was released
+    assert live_texts.state_line(operator).startswith("moving")
 
 
 def test_no_angle_is_minus_zero(operator: PanelBoard) -> None:
