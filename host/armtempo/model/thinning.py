@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
+from armtempo.model import point_groups
 from armtempo.model.joint_unit import DEG, JointUnit
 from armtempo.splines import bspline, extremes
 from armtempo.splines.bspline import REST_PIECES
@@ -267,8 +268,8 @@ def _apart(line: _Polyline, places: Array, steps: Callable[[Array], Array] | Non
     """The places without those less than a step beside another, which the planner takes for one."""
     if steps is None:
         return places
-    found = groups(steps(line.at(places)))
-    return places[[kept(group, len(places) - 1) for group in found]]
+    found = point_groups.groups(steps(line.at(places)))
+    return places[[point_groups.kept(group, len(places) - 1) for group in found]]
 
 
 def _halved(places: Array, which: NDArray[np.bool_]) -> Array:
@@ -396,32 +397,3 @@ def _cut_off(places: Array, met: Array, path: Array) -> float:
 def _rising(chord: NDArray[np.intp], part: Array) -> Array:
     """The parts of each chord, increasing along it."""
     return np.asarray(np.maximum.accumulate(chord + part) - chord)
-
-
-def groups(
-    steps: Array, may_join: Callable[[int, int], bool] = lambda _before, _number: True
-) -> list[list[int]]:
-    """The numbers of points, those that are one together, in order; the two ends are never one.
-
-    ``steps``: (n + 1, J), the motors' positions; ``may_join``: whether a point may be one with an earlier one.
-    """
-    last = len(steps) - 1
-    found = [[0]]
-    for number in range(1, last):
-        if _is_near(steps, found[-1][0], number) and may_join(found[-1][0], number):
-            found[-1].append(number)
-        else:
-            found.append([number])
-    end = [last]
-    while len(found) > 1 and _is_near(steps, found[-1][0], last) and may_join(found[-1][0], end[0]):
-        end = found.pop() + end
-    return [*found, end]
-
-
-def kept(group: Sequence[int], last: int) -> int:
-    """The point whose place a group has: its first, or the last of all."""
-    return last if group[-1] == last else group[0]
-
-
-def _is_near(steps: Array, one: int, other: int) -> bool:
-    return bool(np.all(np.abs(steps[one] - steps[other]) < 1.0))

@@ -15,7 +15,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.installation import installed_version
 from armtempo.basics.progress import Progress, watched
-from armtempo.model import thinning, tool_segment
+from armtempo.model import point_groups, tool_segment
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.leg import JobSolution
@@ -182,11 +182,11 @@ def merged(arm: Arm, job: Job, via_deg: Array) -> Merged:
     two ends are never one. Stops stay, and their dwells add up; what is asked of the tool between points that become
     one counts for the way to them. Raises InputError if that is not the same, or a dwell would be at an end.
     """
-    groups = thinning.groups(arm.transmission.steps(via_deg), partial(_may_join, job))
+    groups = point_groups.groups(arm.transmission.steps(via_deg), partial(_may_join, job))
     if len(groups) == len(job.via):
         return Merged(job, list(range(len(job.via))), ())
     last = len(job.via) - 1
-    kept = [thinning.kept(group, last) for group in groups]
+    kept = [point_groups.kept(group, last) for group in groups]
     segments = []
     stops = []
     notes = []
