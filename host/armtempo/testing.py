@@ -29,7 +29,7 @@ from armtempo_shared.rest_to_rest import PERCENT
 from armtempo_shared.sequence import MAX_COUNTERS
 
 from armtempo.basics.errors import InputError
-from armtempo.encoding import encode, encoded_program, planned_for
+from armtempo.encoding import encode, encoded_program, made_with
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
@@ -204,7 +204,7 @@ class _Work:
         if not file.is_file():
             raise InputError(f"no motion {name!r}: {file} does not exist", "plan it")
         plan = Plan.load_motion(file)
-        planned_for.check(file, plan, self._arm)
+        made_with.check_plan(file, plan, self._arm)
         motion = plan.trajectory
         start = self._arm.transmission.whole_steps(motion(0.0))
         off = np.abs(np.subtract(start, self._steps))

@@ -89,6 +89,22 @@ def test_a_plan_is_computed_without_plots_and_ports() -> None:
     assert not modules_after(code) & {"matplotlib", "click", "scipy.interpolate"}
 
 
+def test_a_goto_to_angles_loads_no_inverse_kinematics_and_no_report() -> None:
+    """The names of what it does without, as each costs every move by hand its milliseconds."""
+    code = (
+        "import armtempo.cli.posture, armtempo.robot.connect\n"
+        "from armtempo.model.arm import Arm\n"
+        "from armtempo.planning import brake_time, point_to_point\n"
+        "arm = Arm.paper()\n"
+        "found = point_to_point.straight('x', arm.home_deg, [20.0, -50.0, 30.0], arm)\n"
+        "brake_time.of_motion(found, [joint.limits for joint in arm.driven])"
+    )
+    heavy = {"scipy", "numpy.ma", "armtempo.kinematics.solver", "armtempo.planning.via_points"}
+    heavy |= {"armtempo.encoding.encoded_program", "armtempo.model.thinning", "armtempo.model.steps"}
+    heavy |= {"armtempo.planning.jog.jog_line", "armtempo.report.run", "armtempo.diagnosis.selftest"}
+    assert not modules_after(code) & heavy
+
+
 def test_every_public_name_is_there_and_described() -> None:
     assert dir(armtempo) == sorted(armtempo.__all__)
     places = {

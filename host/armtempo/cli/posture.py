@@ -24,7 +24,7 @@ from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
 from armtempo.model.tool_pose import BASE, Pose
-from armtempo.planning import point_to_point, via_points
+from armtempo.planning import point_to_point
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
 
@@ -182,6 +182,8 @@ class NamedPosture:
             start_deg = arm.home_deg if self.plan.start_deg is None else self.plan.start_deg
             return point_to_point.posture(start_deg, arm)
         if not name_problem(self.text):
+            from armtempo.planning import via_points  # here, because angles need no inverse kinematics
+
             return via_points.posture_deg(arm, arm.posture(self.text))
         if self.text == HOME:
             return point_to_point.posture(arm.home_deg, arm)

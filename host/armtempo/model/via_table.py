@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,14 +14,16 @@ from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.number_table import NumberTable
-from armtempo.model import joint_trajectory, ros_bag, table_header, thinning
+from armtempo.model import joint_trajectory, ros_bag, table_header
 from armtempo.model.arm import Arm
 from armtempo.model.joint_trajectory import Recorded
 from armtempo.model.joint_unit import DEG, NEUTRAL
 from armtempo.model.parts import DrivenJoint, Joint
 from armtempo.model.table_header import Column, Header
-from armtempo.model.thinning import JointTolerance, Tolerance
 from armtempo.model.tool_pose import BASE, WHOLE
+
+if TYPE_CHECKING:
+    from armtempo.model.thinning import JointTolerance, Tolerance
 
 TOLERANCE_DEG = 0.1
 """Default tolerance for thinning a sampled motion."""
@@ -162,6 +165,8 @@ def via_points(
 
 
 def _tolerance(arm: Arm, given: Tolerance | None) -> JointTolerance:
+    from armtempo.model.thinning import JointTolerance  # here, as a goto reads no recording
+
     units = [joint.unit for joint in arm.driven]
     return JointTolerance.of(TOLERANCE_DEG if given is None else given, units)
 
@@ -170,6 +175,8 @@ def _thinned(
     angles: Array, times_s: Array | None, arm: Arm, tolerance_deg: Tolerance | None, notes: tuple[str, ...],
     where: Sequence[str],
 ) -> ImportedPath:  # fmt: skip
+    from armtempo.model import thinning
+
     tolerance = _tolerance(arm, tolerance_deg)
     _check_ranges(where, angles, arm, tolerance, _MOST_BEYOND)
     scale = tolerance.scale

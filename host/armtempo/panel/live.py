@@ -129,7 +129,7 @@ class LiveArm:
         """Whether the board knows where the arm is, or its encoders tell while it is guided by hand."""
         if self.guided or self.sought:
             return self.guided
-        return self.state is None or all(joint.known for joint in self.state.joints)
+        return self.state is not None and all(joint.known for joint in self.state.joints)
 
     @property
     def fault(self) -> str:

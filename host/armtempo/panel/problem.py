@@ -44,7 +44,7 @@ class Problem:
 def of(operator: PanelBoard) -> Problem | None:
     """The most important one; None if nothing is wrong."""
     live = operator.live
-    is_known = live.state is None or live.known
+    is_known = live.state is None or live.known  # one that is deployed to says nothing
     if operator.trouble and (operator.has_board or not operator.busy):
         return Problem(operator.trouble, () if operator.has_board else (Cure.DEPLOY,))
     if live.fault:

@@ -62,11 +62,11 @@ class SequenceEditor(FileEditor):
         return f'name = "{name}"\n\n[[step]]\ngoto = "home"\n'
 
     def is_one(self, path: Path) -> bool:
-        """Whether a file describes a sequence."""
+        """Whether a file describes a sequence, or is no TOML."""
         try:
             return is_sequence(path)
         except InputError:
-            return False
+            return True
 
     def check(self, text: str, file: Path) -> None:
         """Raise InputError, with step and key, if the text is no sequence."""

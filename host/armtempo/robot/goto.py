@@ -19,7 +19,7 @@ from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Followed, MotionFollower
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.planning import point_to_point, via_points, workspace_check
+from armtempo.planning import point_to_point, workspace_check
 from armtempo.ports.names import is_sim
 from armtempo.robot import arm_state, running
 from armtempo.robot.running import attended, follow, nothing, raise_failure
@@ -55,8 +55,9 @@ def go_to(
     Raises LinkError if the position is unknown, BoardError if the board refuses or a fault ends the move,
     PlanError if the arm would leave its workspace, or the tool cannot reach it in a straight line.
     """
-    if not arm_state.is_at(client, arm, target_deg):
-        here = arm_state.posture_deg(client, arm)
+    status = arm_state.known_status(client, arm)
+    if not arm_state.stands_at(status, arm, target_deg):
+        here = arm_state.angles_deg(status, arm)
         trajectory = motion(arm, here, target_deg, pace or MovePace())
         data = encoded_plan.of_trajectory(trajectory, arm).data
         move_once(client, data, stop, _shown(progress, trajectory.duration_s))
@@ -136,5 +137,7 @@ def posture_deg(where: Where, arm: Arm) -> Array:
         start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
         return point_to_point.posture(start_deg, where.arm)
     if isinstance(where, str):
+        from armtempo.planning import via_points  # here, because angles need no inverse kinematics
+
         return via_points.posture_deg(arm, arm.posture(where))
     return point_to_point.posture(where, arm)

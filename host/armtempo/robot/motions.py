@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import ExitStack
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from armtempo_shared.messages import RESUME
 
@@ -19,9 +19,7 @@ from armtempo.link.board_messages import SequenceState
 from armtempo.link.follow import MotionFollower, RunEnd, SequenceFollower, SequenceWatcher
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, by_of_joint, move_of, number_of_joint
-from armtempo.report.run import Run
 from armtempo.report.run_folder import RunFolder
 from armtempo.robot import arm_state, goto, jog, recording, running
 from armtempo.robot.by_hand import HandGuided
@@ -29,9 +27,12 @@ from armtempo.robot.connection import Connection
 from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.recording import Watcher
-from armtempo.robot.speed import change_speed, permille
+from armtempo.robot.running import change_speed, permille
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import store, stored_name
+
+if TYPE_CHECKING:
+    from armtempo.report.run import Run
 
 MOST_REPETITIONS = 99
 """Their files are numbered with two digits."""
@@ -70,6 +71,10 @@ class Motions:
         with self._board.stoppable(stop) as wanted:
             self._board.start.home_virtual_arm(arm)
             if isinstance(where, Pose):
+                from armtempo.planning import (
+                    via_points,  # here, because a posture needs no inverse kinematics
+                )
+
                 target_deg = via_points.nearest(arm, where, self._posture_deg().tolist())
             assert target_deg is not None
             goto.go_to(self._board.client, arm, target_deg, wanted, progress, goto.MovePace(speed, line))
@@ -186,7 +191,7 @@ class Motions:
             )
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
         self._run(encoded, repeat, Path(out), seen, stop)
-        return Run.load(cast(Path, self._last_folder))
+        return _load(cast(Path, self._last_folder))
 
     def run_sequence(
         self,
@@ -279,12 +284,12 @@ class Motions:
     def last_run(self) -> Run | None:
         """The last run that this object recorded, of a motion or a sequence, even if it ended early; None before the
         first."""
-        return Run.load(self._last_folder) if self._last_folder else None
+        return _load(self._last_folder) if self._last_folder else None
 
     @property
     def last_sequence(self) -> Run | None:
         """The last sequence that this object recorded, even if it ended early; None before the first."""
-        return Run.load(self._last_sequence) if self._last_sequence else None
+        return _load(self._last_sequence) if self._last_sequence else None
 
     def fetch(self, motion: Plan | Encoded | Path | str | None = None, out: Path | str = "runs") -> Run:
         """Write the samples that the board kept of its last run into a new run folder in ``out``.
@@ -301,7 +306,7 @@ class Motions:
         self._board.configure_for(encoded.arm, encoded.plan)
         folder = recording.fetch(self._board.client, encoded, Path(out), self._board.port)
         self._last_folder = folder.path
-        return Run.load(folder.path)
+        return _load(folder.path)
 
     def stop(self, now: bool = False) -> None:
         """Brake along the path (``now``: freeze the outputs), and wait until the arm is at rest.
@@ -353,3 +358,9 @@ class Motions:
 
     def _posture_deg(self) -> Array:
         return arm_state.posture_deg(self._board.client, self._board.known_arm())
+
+
+def _load(folder: Path) -> Run:
+    from armtempo.report.run import Run  # here, because moves read no run folder
+
+    return Run.load(folder)

@@ -12,7 +12,7 @@ from armtempo_shared.sequence import KIND_BYTES, SequenceData, SequenceError
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_plan, encoded_program, flash_use, made_with
+from armtempo.encoding import encoded_plan, flash_use, made_with
 from armtempo.encoding.encoded_plan import Encoded, MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import StoredMotion
@@ -30,7 +30,11 @@ _KINDS = {sequence.MAGIC[:KIND_BYTES]: "sequence", program.MAGIC[:KIND_BYTES]: "
 
 def what_is_old(client: Client, entry: StoredMotion, arm: Arm) -> str:
     """What has changed in the arm since a stored motion, sequence or program was made with it; "" for nothing."""
-    check = encoded_program.check_stored if entry.program else made_with.check_stored
+    check = made_with.check_stored
+    if entry.program:
+        from armtempo.encoding import encoded_program  # here, because it loads the inverse kinematics
+
+        check = encoded_program.check_stored
     try:
         check(entry.name, client.fetch(entry.name), arm)
     except InputError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -33,6 +34,48 @@ def opened(page: Page, text: str = POSES) -> None:
     page.operator.jobs.open("poses.toml")
     page.show(words.TAB_JOB)
     page.look()
+
+
+def test_a_file_that_another_program_writes_is_shown_but_takes_the_place_of_no_changes(
+    operator: PanelBoard,
+) -> None:
+    jobs = operator.jobs
+    with pages(operator) as page:
+        opened(page)
+        file = jobs.folder / "poses.toml"
+        for number, other in enumerate((POSES.replace("310", "320"), "name = 'a file that is half", POSES)):
+            file.write_text(other)
+            os.utime(file, ns=(number, number))
+            page.act(page.of.refresh)
+            page.look()
+            is_read = other.startswith('name = "poses"')
+            assert (jobs.text == other) == is_read
+            assert page.named(words.READ_AGAIN).visible == (not is_read)
+        jobs.set_key(1, "dwell_s", "0.7")
+        file.write_text(POSES.replace("310", "330"))
+        os.utime(file, ns=(9, 9))
+        page.act(page.of.refresh)
+        assert "dwell_s = 0.7" in jobs.text
+        page.press(words.READ_AGAIN)
+        page.answer(words.LOSE)
+        page.look()
+        assert jobs.text == POSES.replace("310", "330")
+        assert not page.named(words.READ_AGAIN).visible
+
+
+def test_changes_that_are_not_saved_are_not_lost_without_a_question(operator: PanelBoard) -> None:
+    jobs = operator.jobs
+    with pages(operator) as page:
+        opened(page)
+        (jobs.folder / "other.toml").write_text(POSES.replace("310", "320"))
+        page.look()
+        jobs.set_key(1, "dwell_s", "0.7")
+        files = page.named(words.JOB_FILE)
+        page.act(lambda: files.set_value("other.toml"))
+        assert (files.value, "dwell_s = 0.7" in jobs.text) == ("poses.toml", True)
+        page.answer(words.LOSE)
+        page.look()
+        assert (files.value, jobs.file) == ("other.toml", jobs.folder / "other.toml")
 
 
 def type_into(page: Page, name: str, text: str, left: bool = True) -> Any:

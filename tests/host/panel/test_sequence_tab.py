@@ -45,7 +45,9 @@ def steps(tmp_path: Path) -> SequenceEditor:
     (tmp_path / "job.toml").write_text('name = "feed"\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n')
     (tmp_path / "damaged.toml").write_text("[[step")
     desk = SequenceEditor(ARM, tmp_path)
-    assert desk.files() == ["day.toml"]
+    assert desk.files() == ["damaged.toml", "day.toml"]
+    with pytest.raises(InputError, match="damaged"):
+        desk.open("damaged.toml")
     desk.open("day.toml")
     return desk
 
@@ -89,7 +91,7 @@ def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceEditor) -> None
     assert steps.steps[1] == steps.steps[2] == {"goto": "[10, -60, 40]"}
     steps.new("fresh")
     assert steps.save().name == "fresh.toml"
-    assert steps.files() == ["day.toml", "fresh.toml"]
+    assert steps.files() == ["damaged.toml", "day.toml", "fresh.toml"]
     with pytest.raises(InputError, match="no such sequence"):
         steps.open("../day.toml")
 
