@@ -8,6 +8,7 @@ import os
 import shutil
 import signal
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,6 +20,8 @@ from tests import interpreters
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # Started in the background: the commands that the tests start would inherit it and not mind Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+gc.disable()  # until all is collected: hardly anything of that is garbage, and looking for it takes a tenth of the time
 
 NEEDS = {
     "board/test_cortex_m4.py": "unicorn",
@@ -37,6 +40,7 @@ DEPRECATIONS = ("DeprecationWarning", "PendingDeprecationWarning", "FutureWarnin
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Random tests with other cases than every day's, and what only a release needs."""
     parser.addoption("--long", action="store_true", help="the tests marked long, too")
+    parser.addoption("--brief", action="store_true", help="what another Python beside it may do otherwise")
     parser.addoption("--cases", type=int, metavar="N", help="N random cases for each test that has seeds")
     parser.addoption("--first", type=int, default=0, metavar="SEED", help="the first of them, default 0")
 
@@ -98,9 +102,11 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """All of ``system/`` is slow. Several workers begin with what takes long, so that they end together."""
-    if not config.getoption("long"):
-        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("long")])
-        items[:] = [item for item in items if not item.get_closest_marker("long")]
+    kept = [item for item in items if config.getoption("long") or not item.get_closest_marker("long")]
+    if config.getoption("brief"):
+        kept = _brief(kept)
+    config.hook.pytest_deselected(items=list(set(items).difference(kept)))
+    items[:] = kept
     for item in items:
         if item.path.is_relative_to(interpreters.ROOT / "tests" / "system"):
             item.add_marker(pytest.mark.slow)
@@ -108,8 +114,23 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
+def _brief(items: list[pytest.Item]) -> list[pytest.Item]:
+    """Two variants of each quick test; none in MicroPython, nor of what sources say, the same with any Python."""
+    kept, seen = [], Counter[str]()
+    for item in items:
+        name, _, variant = item.nodeid.partition("[")
+        group = item.get_closest_marker("xdist_group")
+        is_slow = item.get_closest_marker("slow") or variant.startswith("micropython")
+        if not is_slow and (group is None or group.args != ("sources",)):
+            seen[name] += 1
+            if seen[name] <= 2:
+                kept.append(item)
+    return kept
+
+
 def pytest_collection_finish() -> None:
     """What was imported and collected stays: looked through with all else, it takes a tenth of the tests' time."""
+    gc.enable()
     gc.collect()
     gc.freeze()
 

@@ -17,7 +17,7 @@ from typing import Any
 from unittest.mock import patch
 
 from armtempo.basics.errors import LinkError
-from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_plan import MotionKey
 from armtempo.link import Client, greet
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import MotionFollower, RunEnd

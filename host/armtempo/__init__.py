@@ -58,7 +58,6 @@ if TYPE_CHECKING:
     from armtempo.model.plan import Plan as Plan
     from armtempo.model.posture import ArmPosture as ArmPosture
     from armtempo.model.sequence import Sequence as Sequence
-    from armtempo.model.sequence_plan import SequencePlan as SequencePlan
     from armtempo.model.steps import (
         Count as Count,
         EachPlace as EachPlace,
@@ -138,7 +137,6 @@ _HOMES = {
     ),
     "armtempo.model.plan": ("Plan",),
     "armtempo.model.sequence": ("Sequence",),
-    "armtempo.model.sequence_plan": ("SequencePlan",),
     "armtempo.model.tool": ("ArmTool",),
     "armtempo.model.tool_pose": ("Pose",),
     "armtempo.model.tool_segment": ("ToolSegment",),

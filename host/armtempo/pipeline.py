@@ -3,7 +3,7 @@
 ::
 
     plan     arm and job -> Plan              planning: via angles, path, time axes, checks
-    load     trajectory file -> Plan          model.plan
+    load     file of a plan -> Plan           model.plan
     run      Plan -> records -> board         encoding, link, robot.running; there evaluator, rings, timers
              board -> samples -> run folder   link.follow, report.run_folder
     report   run folder -> page and figures   Run.report
@@ -20,12 +20,11 @@ from pathlib import Path
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import RunFolderError
 from armtempo.basics.progress import Progress, part
-from armtempo.encoding import planned_for
+from armtempo.encoding import made_with
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import AnyPlan, SequencePlan, load_plan
 from armtempo.planning import checks, planner, sequence_planner
 from armtempo.planning import split as cut
 from armtempo.report import comparison, text_summary
@@ -61,7 +60,7 @@ def plan(arm: Arm | Path | str, job: Job | Path | str, progress: Progress | None
 @checked
 def plan_sequence(
     arm: Arm | Path | str, sequence: Sequence | Path | str, progress: Progress | None = None
-) -> SequencePlan:
+) -> Plan:
     """Plan all motions of a sequence (or of its file), each from the end of the one before; raises as
     ``sequence_planner.plan``."""
     arm = Arm.of(arm)
@@ -94,16 +93,16 @@ def summary(plan: Plan, verbose: bool = False) -> list[str]:
     return text_summary.lines(plan, verbose)
 
 
-def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> AnyPlan:
+def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Plan:
     """The plan of a file, of a motion or a sequence.
 
     ``altered``: accept a file that was altered after it had been written. Raises InputError if it is no
     plan's file, is damaged or altered, or was planned for another arm than ``arm``, or for one of its frames
     that has changed since.
     """
-    found = load_plan(path, altered)
+    found = Plan.load(path, altered)
     if arm is not None:
-        planned_for.check(path, found, arm)
+        made_with.check_plan(path, found, arm)
     return found
 
 

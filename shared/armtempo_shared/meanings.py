@@ -195,7 +195,8 @@ COMMANDS: "dict[str, str]" = {
     "tail is the unique id in hex and the firmware.",
     "status": "What the board is doing. `known`: one bit per joint, its position is known. `run`: number of the "
     "current or last run since the start. `ticks`: motion clock. `path`: the motion's own time, which lags behind "
-    "the clock if the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion. "
+    "the clock if the speed was below 100 %. `fault_joint`: also the joint whose switch ended the last homing motion, "
+    "plus 64 if it was none that its joints moved to. "
     "`rate`: the requested speed in thousandths, 0 in a pause; while nothing moves, that of the next start. "
     "`rest_ms`: milliseconds until rest if the arm is stopped now, or after a stop; 0 if nothing moves, or if a "
     "stop freezes. Tail: per joint commanded steps and encoder counts (two i32).",
@@ -228,7 +229,8 @@ COMMANDS: "dict[str, str]" = {
     "joint.",
     "start": "Starts a stored trajectory whose checksum is `crc`; the name `/once`: the record of `put_once`. "
     "`flags` 1: a limit switch ends it without a fault; with bits from 4 on, one per joint, only a switch of these "
-    "joints does, else one of any that moves; 2: it is held, and brakes without a fault when no `hold` "
+    "joints does, else one of any that moves; with 256, one that was not pressed at the start and that they do not "
+    "move to, too; 2: it is held, and brakes without a fault when no `hold` "
     "arrives for 300 ms. Answer: number of the run and its length in ticks. Or starts a sequence, each of whose "
     "motions is a run of its own; then the answer has the number of the last run and 0. The same with a program.",
     "stop": "`now` 0: brake along the path (freeze if the motion has no brake times); 1: freeze.",

@@ -1,6 +1,6 @@
 """Constants of the wire protocol; its messages are in ``table.py``, its frames in ``wire.py``."""
 
-PROTOCOL_VERSION = 7
+PROTOCOL_VERSION = 8
 """Never 3: each ``hello`` contains it, and MicroPython takes this byte for Ctrl-C."""
 SYNC = 0xA5
 MAX_PAYLOAD = 256
@@ -32,6 +32,9 @@ START_HOMING = 1  # flag of start: a limit switch ends the motion without a faul
 START_HELD = 2  # flag of start: the motion brakes unless the host keeps sending hold
 START_SWITCHES_BIT = 2
 """First bit of start's flags for a homing motion: a bit per joint whose switches end it; none: all that move."""
+START_SEEKS = 256  # flag of start: of a homing motion, the switches that its joints do not move to end it too
+OTHER_SWITCH = 64
+"""In the number of the joint whose switch ended a homing motion: it was one that the joints did not move to."""
 
 FEATURES = ("sequences", "outputs", "jog", "speed")
 """Optional features of a program; bits of ``features`` in the answer to ``hello``."""

@@ -35,7 +35,7 @@ C get 16 offset:I length:H text
 C set_default 17 text
 C put_once 1a offset:H size:H bytes
 C home 20 joints:B bytes
-C start 21 flags:B crc:I text
+C start 21 flags:H crc:I text
 C stop 22 now:B
 C clear 23
 C speed 25 rate:H

@@ -31,7 +31,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError
 from armtempo.deploy import program_files
-from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding import encode, encoded_plan
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -275,7 +275,7 @@ def run(elf: Path, image: Path, backlash_deg: float = 0.0) -> dict[str, Heap]:
             _check_steps(board, arm, plan.trajectory(plan.total_s))
         print(f"    {plan.job.name}: {plan.total_s:.3f} s, {len(done.samples)} samples, ends where planned")
         _wait(said, "@ ended")
-        record = encoded_motion.of_plan(plan).data
+        record = encoded_plan.of_plan(plan).data
         if backlash_deg:
             edges = check_crossings(record, said[before:], arm)
             print(f"    pulses with {backlash_deg} deg of backlash, and the least time between two: {edges}")

@@ -286,19 +286,3 @@ def ring_state(isr: Mapping[str, int], space: int, ring: array[int], queue: arra
     for word, address in zip(("RING_AT", "QUEUE_AT"), Machine.places(ring, queue), strict=True):
         state[isr[word]] = address
     return state
-
-
-def machine_code_bytes(data: bytes) -> int:
-    """Bytes of machine code in a compiled file."""
-    reader = _at_code(data)
-    return _machine_code(reader)
-
-
-def _machine_code(reader: _Reader) -> int:
-    head = reader.number()
-    kind, has_children, length = head & 3, head & 4, head >> 3
-    reader.at += length
-    if kind:
-        reader.number()
-    below = sum(_machine_code(reader) for _ in range(reader.number())) if has_children else 0
-    return below + (length if kind else 0)

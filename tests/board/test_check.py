@@ -68,9 +68,9 @@ def extremes(record: bytes, joint: int) -> tuple[float, float]:
     return float(np.min(found)), float(np.max(found))
 
 
-@pytest.mark.parametrize("sign", [-1, 1])
 @pytest.mark.parametrize(
-    "bend", [(10.0, 10.0, -40.0, 90.0, 70.0, 10.0), (10.0, 15.0, -60.0, 95.0, 80.0, 10.0)]
+    ("sign", "bend"),
+    [(-1, (10.0, 10.0, -40.0, 90.0, 70.0, 10.0)), (1, (10.0, 15.0, -60.0, 95.0, 80.0, 10.0))],
 )
 def test_range_where_the_extremes_lie_between_the_knots(
     interpreter: str, sign: int, bend: tuple[float, ...], tmp_path: Path

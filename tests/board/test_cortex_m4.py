@@ -37,7 +37,7 @@ def hold(what: str, found: float, stored: float) -> None:
 
 @pytest.fixture(scope="module")
 def figures() -> dict[str, dict[str, float]]:
-    """Measured now."""
+    """Measured now, of the shipped motion the dearest joint."""
     found: dict[str, dict[str, float]] = json.loads(interpreters.run("cpython", BENCHMARK, "--json"))
     return found
 
@@ -49,7 +49,7 @@ COUNTS = ("steps", "stretches")
 @pytest.mark.slow
 def test_steps_cost_no_more_than_is_stored(figures: dict[str, dict[str, float]]) -> None:
     stored = json.loads(BENCHMARK.with_suffix(".json").read_text())
-    assert figures.keys() == stored.keys()
+    assert figures.keys() < stored.keys()
     for case, row in figures.items():
         for name, value in row.items():
             if name in COUNTS:

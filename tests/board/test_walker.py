@@ -45,15 +45,16 @@ def test_steps_are_where_the_spline_says(name: str, tmp_path: Path) -> None:
     assert oracle.verify(record, steps[0]) <= 0.77  # half a tick is the rounding
 
 
-@pytest.mark.parametrize("beyond", [-1e-4, -1e-6, 1e-6, 3e-5, 1e-4, 2e-4, 1e-3, 0.1])
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_a_turn_that_just_reaches_a_half_step(sign: int, beyond: float, tmp_path: Path) -> None:
+def test_a_turn_that_just_reaches_a_half_step(sign: int, tmp_path: Path) -> None:
     """The two steps of a turn that comes too little beyond it are left out; here it lies between two segments."""
-    via = sign * np.array([0.0, 20.5 + beyond, 0.0])
-    record = motions.record([via], [np.full(2, 0.1)], 5)
-    verdicts, steps = oracle.walk(QUICK, tmp_path, [record])
-    assert verdicts == ["None"]
-    oracle.verify(record, steps[0])
+    beyond = (-1e-4, -1e-6, 1e-6, 3e-5, 1e-4, 2e-4, 1e-3, 0.1)
+    vias = [sign * np.array([0.0, 20.5 + much, 0.0]) for much in beyond]
+    records = [motions.record([via], [np.full(2, 0.1)], 5) for via in vias]
+    verdicts, steps = oracle.walk(QUICK, tmp_path, records)
+    assert verdicts == ["None"] * len(records)
+    for record, found in zip(records, steps, strict=True):
+        oracle.verify(record, found)
 
 
 def chance_records(count: int) -> list[bytes]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.encoding import encoded_motion, encoded_sequence
+from armtempo.encoding import encoded_plan
 from armtempo.link.board_messages import Positions, RowBegun, Sample, SequenceState
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
@@ -17,7 +17,6 @@ from armtempo.model.job import Job
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.model.steps import Count, Goto, Repeat
 from armtempo.planning import planner, sequence_planner
 from armtempo.report import arm_picture, drawing, plots, run_folder
@@ -37,7 +36,7 @@ def shipped_plan() -> Plan:
 @cache
 def shipped_record() -> bytes:
     """Its record for the board."""
-    return encoded_motion.of_plan(shipped_plan()).data
+    return encoded_plan.of_plan(shipped_plan()).data
 
 
 def blind_plan(*joints: int) -> Plan:
@@ -79,7 +78,7 @@ def make(
     rng = np.random.default_rng(seed)
     path.mkdir(parents=True)
     folder = run_folder.RunFolder(path, made.job.name, run_folder.scales(made.arm), {"port": "sim"})
-    folder.write_legs([shipped_record() if plan is None else encoded_motion.of_plan(made).data])
+    folder.write_legs([shipped_record() if plan is None else encoded_plan.of_plan(made).data])
     if on_board:
         arm_json.save(made.arm, path / run_folder.ARM)
     else:
@@ -94,7 +93,7 @@ def make(
 
 
 @cache
-def small_sequence() -> SequencePlan:
+def small_sequence() -> Plan:
     """There and back without end, each pass counted."""
     steps = (Goto((3.0, -58.0, 41.0)), Goto("home"), Count("parts"))
     arm = Arm.paper()
@@ -126,7 +125,7 @@ def make_sequence(
     rows = tuple(RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words) for row in plan.rows)
     names = tuple(f"pick-{number}" for number in range(1, len(plan.legs) + 1))
     folder = run_folder.RunFolder(path, "pick", tuple(scales), {"port": "sim"}, legs=names, rows=rows)
-    folder.write_legs(motion.data for motion in encoded_sequence.of_plan(plan).motions)
+    folder.write_legs(motion.data for motion in encoded_plan.of_plan(plan).legs)
     plan.save(path / run_folder.SEQUENCE)
     passes = [0, *(list(range(1, len(rows))) * cycles)]
     rng = np.random.default_rng(1)
@@ -139,7 +138,9 @@ def make_sequence(
                 value = cycle + 1 if row.op == COUNT else 0
                 file.begin_row(RowBegun(passed, run, number, row.step, max(cycle, 0), value), 0.5 * passed)
             if row.op == MOVE:
-                for sample in _samples(plan.arm, plan.legs[row.number], scatter_deg, rng, run, steps_off):
+                for sample in _samples(
+                    plan.arm, plan.legs[row.number].trajectory, scatter_deg, rng, run, steps_off
+                ):
                     if run > 1 or sample.index not in drop:
                         file.append(sample, None if passed in lost_rows else number)
         end = SequenceState(state, 0, 4, 0, cycles, "pick")

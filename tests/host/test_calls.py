@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.cli.jog_screen import JogScreen
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_plan
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.robot.board import Board
@@ -69,7 +69,7 @@ def modules(calls: list[str]) -> list[str]:
 def test_a_start_goes_from_board_to_client_to_session(made: tuple[Board, Listening], tmp_path: Path) -> None:
     board, pipe = made
     move = point_to_point.straight("move", ARM.home_deg, np.array(ARM.home_deg) + 1.0, ARM)
-    board.run(encoded_motion.of_trajectory(move, ARM), out=tmp_path / "runs")
+    board.run(encoded_plan.of_trajectory(move, ARM), out=tmp_path / "runs")
     (calls,) = pipe.starts
     assert modules(calls) == ["robot.motions", "link.client", "link.session"]
 

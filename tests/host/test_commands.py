@@ -106,7 +106,7 @@ def test_run_writes_a_folder(run: Run, file: str, pipe: Pipe) -> None:
     assert "12 samples" in output
     found = run_reader.load(Path("runs/small-001"))
     assert len(found.repetitions[0].index) == 12
-    assert found.trajectory_path is not None
+    assert found.plan_path is not None
     assert (Path("runs/small-001") / "leg-01.bin").read_bytes()[:4] == b"ATM4"
 
 

@@ -254,6 +254,7 @@ def place_of(arm: Arm, angles_deg: list[float], name: str) -> list[float]:
     return [round(float(value), 4) for value in seen[:3, 3]]
 
 
+@pytest.mark.slow
 def test_a_posture_in_a_frame_is_where_the_tool_is_there(tmp_path: Path) -> None:
     place = place_of(Arm.load(arm_file(tmp_path)), [20.0, -40.0, 30.0], "tray")
     arm = Arm.load(arm_file(tmp_path, f'{FRAMES}\n[posture.over]\nframe = "tray"\nposition_mm = {place}\n'))

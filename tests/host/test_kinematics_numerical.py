@@ -192,6 +192,7 @@ def test_an_axis_that_turns_nothing_leaves_a_joint_free() -> None:
     assert near.angles_rad[4] == pytest.approx(start[4], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_answer() -> None:
     solver = PoseSolver(OFFSET_WRIST)
     wanted = asked(forward(solver.geometry, np.radians([150.0, -20.0, -100.0, 90.0, -80.0, 200.0])), WHOLE)

@@ -59,6 +59,32 @@ def test_a_jog_stays_near_and_meets_each_pose(arm: Arm, fixed: tuple[str, ...]) 
         at = list(found.angles_rad)
 
 
+@pytest.mark.parametrize("chained", [False, True])
+def test_many_at_once_are_as_one_by_one(chained: bool) -> None:
+    """They end where one is singular or out of reach, and if there is no closed form."""
+    rng = np.random.default_rng(52)
+    solver = PoseSolver(SIX)
+    start, end = drawn_posture(solver, rng), drawn_posture(solver, rng)
+    there = start + np.linspace(0.0, 0.5, 30)[:, None] * (end - start)
+    poses = forward(solver.geometry, there)
+    found = solver.nearest_of_many(poses, start if chained else there, (0.02, 0.02))
+    assert len(found) == 30, "seed 52"
+    at = start.tolist()
+    for number, posture in enumerate(found):
+        one = solver.nearest(Pose.of_matrix(poses[number]), at if chained else there[number].tolist())
+        np.testing.assert_allclose(posture, one.angles_rad, atol=1e-12)
+        at = list(one.angles_rad)
+
+    straight = there.copy()
+    straight[20, 4] = 0.0
+    far = poses.copy()
+    far[12, 0, 3] += 1e6
+    assert len(solver.nearest_of_many(forward(solver.geometry, straight), straight, (0.02, 0.02))) == 20
+    assert len(solver.nearest_of_many(far, there, (0.02, 0.02))) == 12
+    assert len(solver.nearest_of_many(poses, there, (1e-20, 1e-20))) == 0
+    assert PoseSolver(FIVE).nearest_of_many(poses, np.zeros(5), (0.02, 0.02)).shape == (0, 5)
+
+
 def test_nearest_is_the_choice_of_the_closed_form() -> None:
     rng = np.random.default_rng(52)
     solver = PoseSolver(SIX)
@@ -140,6 +166,7 @@ def test_a_whole_pose_a_little_out_of_reach_is_met_within_its_tolerance() -> Non
     assert answer.miss.rotation_deg <= 0.1
 
 
+@pytest.mark.slow
 def test_a_refusal_lists_the_reasons_solution_by_solution() -> None:
     solver = PoseSolver(SIX)
     answer = solver.solve(Pose.of_angles((900.0, 0.0, 300.0), dict.fromkeys(WHOLE, 0.0)), solver.home_rad)

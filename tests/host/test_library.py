@@ -17,8 +17,8 @@ import armtempo
 import numpy as np
 import pytest
 from armtempo.basics import errors
-from armtempo.encoding import encoded_sequence
-from armtempo.encoding.encoded_sequence import EncodedSequence
+from armtempo.encoding import encoded_plan
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.kinematics import PoseSolver
 from armtempo.kinematics.chain import chains_mm
 from armtempo.link.board_messages import Sample
@@ -46,8 +46,8 @@ def test_the_button_starts_an_uploaded_sequence_only_where_asked(
     client: Any = SimpleNamespace(set_default=defaults.append)
     monkeypatch.setattr(arm_state, "configure", lambda *_: None)
     sequence = armtempo.plan_sequence(arm, armtempo.Sequence("pick", (armtempo.Wait(1.0),)))
-    encoded = EncodedSequence("pick", arm, (), (), bytes(4))  # the board takes no row without a step
-    monkeypatch.setattr(encoded_sequence, "of_plan", lambda plan: encoded)
+    encoded = Encoded("pick", arm, (), (), bytes(4))  # the board takes no row without a step
+    monkeypatch.setattr(encoded_plan, "of_plan", lambda *_: encoded)
     monkeypatch.setattr("armtempo.robot.store.store", lambda *_: None)
     board = armtempo.Board(client, "pipe")
     board.upload_sequence(sequence)
@@ -87,6 +87,22 @@ def test_a_plan_is_computed_without_plots_and_ports() -> None:
         "armtempo.plan(arm, job)"
     )
     assert not modules_after(code) & {"matplotlib", "click", "scipy.interpolate"}
+
+
+def test_a_goto_to_angles_loads_no_inverse_kinematics_and_no_report() -> None:
+    """The names of what it does without, as each costs every move by hand its milliseconds."""
+    code = (
+        "import armtempo.cli.posture, armtempo.robot.connect\n"
+        "from armtempo.model.arm import Arm\n"
+        "from armtempo.planning import brake_time, point_to_point\n"
+        "arm = Arm.paper()\n"
+        "found = point_to_point.straight('x', arm.home_deg, [20.0, -50.0, 30.0], arm)\n"
+        "brake_time.of_motion(found, [joint.limits for joint in arm.driven])"
+    )
+    heavy = {"scipy", "numpy.ma", "armtempo.kinematics.solver", "armtempo.planning.via_points"}
+    heavy |= {"armtempo.encoding.encoded_program", "armtempo.model.thinning", "armtempo.model.steps"}
+    heavy |= {"armtempo.planning.jog.jog_line", "armtempo.report.run", "armtempo.diagnosis.selftest"}
+    assert not modules_after(code) & heavy
 
 
 def test_every_public_name_is_there_and_described() -> None:
@@ -155,6 +171,7 @@ def test_a_plan_goes_through_its_via_points_and_its_file(plan: armtempo.Plan, tm
     assert again.job == plan.job
 
 
+@pytest.mark.slow
 def test_a_plan_goes_to_other_programs_and_comes_back_as_a_job(
     plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
 ) -> None:
@@ -232,6 +249,7 @@ def test_angles_that_are_a_name_are_refused_in_words(arm: armtempo.Arm) -> None:
         armtempo.forward(arm, "home")
 
 
+@pytest.mark.slow
 def test_an_arm_and_a_sequence_are_made_in_code() -> None:
     limits = armtempo.Limits(speed_deg_s=50, acceleration_deg_s2=100, jerk_deg_s3=500)
     motor = armtempo.Motor(channel=1, steps_per_rev=200, microsteps=16, gear_ratio=10)
@@ -246,7 +264,7 @@ def test_an_arm_and_a_sequence_are_made_in_code() -> None:
     assert [row.words for row in planned.rows if row.words.startswith("output")] == 2 * [
         "output gripper closed"
     ]
-    record = encoded_sequence.of_plan(planned)  # the board takes no row without a step
+    record = encoded_plan.of_plan(planned)  # the board takes no row without a step
     assert record.rows[-1].step == 6
     assert [step.step for step in sequence.steps] == [1, 6]
     with pytest.raises(armtempo.InputError, match="no output 'griper'"):
@@ -381,6 +399,7 @@ def test_every_shipped_arm_gets_back_the_posture_that_made_a_pose(name: str) -> 
         assert (first.branch == "") == bool(PoseSolver(arm).refusals)
 
 
+@pytest.mark.slow
 def test_inverse_serves_poses_that_ask_for_less() -> None:
     arm = armtempo.Arm.load("moveo")
     home = armtempo.forward(arm, arm.home_deg)

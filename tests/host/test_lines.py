@@ -31,6 +31,7 @@ from armtempo.splines import bspline
 from tests.host.arms import PLANAR_3
 from tests.host.problems import faults
 from tests.host.random_lines import allowed, line_faults, random_arc, random_lines, tool_poses
+from tests.plans import changed
 
 ARM = Arm.of("parol6")
 START = (90.0, -100.0, 200.0, 5.0, 40.0, 180.0)
@@ -116,9 +117,9 @@ def test_a_wait_after_a_line_and_a_free_path_after_it() -> None:
 def test_faults_of_a_line_are_seen(plan: Plan) -> None:
     """The check itself: a plan checked against a line nearby, and against a lower speed."""
     ways = (replace(plan.job.tool_segments[0], speed_mm_s=79.0), plan.job.tool_segments[1])
-    assert line_faults(replace(plan, job=replace(plan.job, tool_segments=ways)))
+    assert line_faults(changed(plan, job=replace(plan.job, tool_segments=ways)))
     ways = (replace(plan.job.tool_segments[0], tolerance_mm=0.01), plan.job.tool_segments[1])
-    assert line_faults(replace(plan, job=replace(plan.job, tool_segments=ways)))
+    assert line_faults(changed(plan, job=replace(plan.job, tool_segments=ways)))
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from threading import Event, Thread
 
 import pytest
 from armtempo.basics.errors import LinkError, NoAnswerError, OtherBoardError
-from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.encoding.encoded_plan import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import MotionFollower, RunEnd

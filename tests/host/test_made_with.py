@@ -11,7 +11,7 @@ import armtempo
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import stored
-from armtempo.encoding import encoded_motion, encoded_program, encoded_sequence, made_with, planned_for
+from armtempo.encoding import encoded_plan, encoded_program, made_with
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -93,30 +93,30 @@ def test_a_plan_and_a_stored_motion_are_old_if_what_they_use_has_changed(
     new, said = CHANGES[old]
     assert old in MORE
     now = arm(tmp_path, MORE.replace(old, new, 1))
-    data = encoded_motion.of_plan(plan).data
+    data = encoded_plan.of_plan(plan).data
     assert Motion(data).joints == 6
     made_with.check_stored("j", data, arm(tmp_path))
     if not said:
-        planned_for.check("j.json", plan, now)
+        made_with.check_plan("j.json", plan, now)
         made_with.check_stored("j", data, now)
         return
     with pytest.raises(InputError, match=said):
-        planned_for.check("j.json", plan, now)
+        made_with.check_plan("j.json", plan, now)
     with pytest.raises(InputError, match=f"'j' on the board is old: {said}"):
         made_with.check_stored("j", data, now)
 
 
 def test_the_rows_of_the_arm_count_too_and_a_new_workspace(plan: Plan, tmp_path: Path) -> None:
     found = arm(tmp_path)
-    data = encoded_motion.of_plan(plan).data
+    data = encoded_plan.of_plan(plan).data
     for change in ({"d_mm": 170.0}, {"theta_offset_deg": 1.0}, {"parallel_linkage": True}):
         longer = replace(found, joints=(*found.joints[:5], replace(found.joints[5], **change)))
         with pytest.raises(InputError, match="the table of joints has changed since"):
             made_with.check_stored("j", data, longer)
     without = replace(plan, arm=replace(plan.arm, workspace=None))
     with pytest.raises(InputError, match="the workspace, or the radius of a link, has changed since"):
-        made_with.check_stored("j", encoded_motion.of_plan(without).data, found)
-    bare = encoded_motion.of_trajectory(plan.trajectory, plan.arm)
+        made_with.check_stored("j", encoded_plan.of_plan(without).data, found)
+    bare = encoded_plan.of_trajectory(plan.trajectory, plan.arm)
     made_with.check_stored("j", bare.data, longer)  # of an older version: not known
     assert made_with.of_record(b"ATM4") == {}
     assert made_with.added(bytes(16_300), {"workspace": 1, "rows": 12345, "frame " + 60 * "x": 1}) == bytes(
@@ -126,7 +126,7 @@ def test_the_rows_of_the_arm_count_too_and_a_new_workspace(plan: Plan, tmp_path:
 
 def test_a_stored_sequence_is_old_with_its_pallet_frame_and_tool(tmp_path: Path, quick: None) -> None:  # noqa: F811
     steps = f'[[step]]\ntool = "pen"\n{pallets.STEPS}'
-    data = encoded_sequence.of_plan(pallets.planned(tmp_path, steps, MORE)).data
+    data = encoded_plan.of_plan(pallets.planned(tmp_path, steps, MORE)).data
     made_with.check_stored("s", data, arm(tmp_path))
     for old, new, said in (
         ("column_mm = 12", "column_mm = 13", "pallet 'tray' has changed since, or is gone"),
@@ -167,13 +167,16 @@ def test_a_stored_program_is_old_if_a_place_or_posture_of_it_is_elsewhere(tmp_pa
 class Stored:
     """A board with one record, set up for an arm; whatever else is asked of it fails."""
 
-    def __init__(self, name: str, data: bytes, arm: Arm, **kind: bool) -> None:
+    def __init__(
+        self, name: str, data: bytes, arm: Arm, records: dict[str, bytes] | None = None, **kind: bool
+    ) -> None:
         self.arm = arm
         self.client: Any = self
         self.entry = SimpleNamespace(
             name=name, crc=1, joints=6, **{"sequence": False, "program": False, **kind}
         )
         self.data = data
+        self.records = records or {}
 
     def find(self, name: str) -> Any:
         return self.entry if name == self.entry.name else None
@@ -181,8 +184,8 @@ class Stored:
     def stored(self) -> list[Any]:
         return [self.entry]
 
-    def fetch(self, _: str) -> bytes:
-        return self.data
+    def fetch(self, name: str) -> bytes:
+        return self.records.get(name, self.data)
 
     def stoppable(self, _: object) -> Any:
         import contextlib
@@ -193,6 +196,9 @@ class Stored:
         return self.arm
 
     def configure(self, _: Arm) -> None:
+        pass
+
+    def configure_for(self, *_: object) -> None:
         pass
 
     def home(self, _: object) -> None:
@@ -206,12 +212,12 @@ def test_a_default_that_is_no_program_starts_nothing_at_power_up(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     monkeypatch.setattr("armtempo.robot.store.store", lambda *_: None)
-    motion = encoded_motion.of_plan(plan)
+    motion = encoded_plan.of_plan(plan)
     alone = replace(motion, arm=replace(motion.arm, safety=replace(motion.arm.safety, at_power_up="program")))
     for what, told in ((motion, 0), (alone, 1)):
         defaults: list[str] = []
         client = SimpleNamespace(set_default=defaults.append)
-        board: Any = SimpleNamespace(client=client, encoded=lambda what, _: what)
+        board: Any = SimpleNamespace(client=client, configure_for=lambda *_: None)
         BoardStore(board).upload(what, default=True)
         assert defaults == [motion.name]
         assert len(caplog.messages) == told
@@ -226,15 +232,13 @@ def test_what_is_old_is_not_run_by_its_name_and_listed(
 ) -> None:
     now = arm(tmp_path, MORE.replace("floor_mm = -100", "floor_mm = -99"))
     defaults: list[str] = []
-    motion: Any = Stored("j", encoded_motion.of_plan(plan).data, now)
-    store: Any = SimpleNamespace(read=lambda name: encoded_motion.of_record(name, motion.data, now))
+    motion: Any = Stored("j", encoded_plan.of_plan(plan).data, now)
     with pytest.raises(InputError, match="'j' on the board is old: the workspace"):
-        Motions(motion, store).run("j", out=tmp_path)
-    sequence: Any = Stored(
-        "s", encoded_sequence.of_plan(pallets.planned(tmp_path, more=MORE)).data, now, sequence=True
-    )
+        Motions(motion).run("j", out=tmp_path)
+    encoded = encoded_plan.of_plan(pallets.planned(tmp_path, more=MORE))
+    sequence: Any = Stored("s", encoded.data, now, dict(encoded.records), sequence=True)
     with pytest.raises(InputError, match="'s' on the board is old: the workspace"):
-        Motions(sequence, store).run_sequence("s")
+        Motions(sequence).run_sequence("s")
     path = tmp_path / "pick.py"
     path.write_text("from armtempo_board import cell\ncell.goto('over')\n", encoding="utf-8")
     found = arm(tmp_path)

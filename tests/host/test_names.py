@@ -14,7 +14,7 @@ from armtempo.basics.errors import InputError
 from armtempo.basics.text import aligned
 from armtempo.cli import main, stored
 from armtempo.diagnosis.finding import Finding, Level
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_plan
 from armtempo.link import board_messages
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
@@ -200,7 +200,7 @@ def test_a_path_that_swings_beyond_its_via_points_is_told_with_joint_place_and_d
 
 
 def test_results_and_times_of_joints_with_long_names(made: Plan) -> None:
-    motion = encoded_motion.of_plan(made)
+    motion = encoded_plan.of_plan(made)
     scales = run_folder.scales(made.arm)
     steps = tuple(-1_234_567 for _ in scales)
     run = RunData(Path(), {}, scales, (), (Repetition("", commanded_steps=steps, counts=steps),))
@@ -229,6 +229,7 @@ SENTENCES = (
 """Parts of sentences that had to be read twice."""
 
 
+@pytest.mark.slow
 @sources.TOGETHER
 def test_sentences_that_had_to_be_read_twice_are_gone() -> None:
     texts = [

@@ -16,7 +16,6 @@ from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.robot import arm_state
 from armtempo.robot.connection import Connection
 
@@ -36,7 +35,7 @@ def moved(folder: Path, old: str, new: str) -> Arm:
 
 
 @pytest.fixture(scope="module")
-def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, SequencePlan]:
+def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Plan]:
     """A motion and a sequence with a pose in the tray."""
     folder = tmp_path_factory.mktemp("planned")
     place = place_of(Arm.load(arm_file(folder)), [20.0, -55.0, 30.0], "tray")
@@ -52,20 +51,21 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, SequencePla
     return plan, pipeline.plan_sequence(arm, sequence)
 
 
-def loaded(plan: Plan, sequence: SequencePlan, arm: Arm, folder: Path) -> list[Callable[[], object]]:
+def loaded(plan: Plan, sequence: Plan, arm: Arm, folder: Path) -> list[Callable[[], object]]:
     """The ways in which a plan meets an arm."""
     plan.save(folder / "plan.json", force=True)
     board = Connection(cast(Any, None), "sim")
     board.arm = arm
     return [
         lambda: pipeline.load(folder / "plan.json", arm),
-        lambda: board.configure_for(plan),
-        lambda: board.configure_for(sequence),
+        lambda: board.configure_for(plan.arm, plan),
+        lambda: board.configure_for(sequence.arm, sequence),
     ]
 
 
+@pytest.mark.slow
 def test_a_plan_is_old_when_its_frame_is_elsewhere(
-    tmp_path: Path, planned: tuple[Plan, SequencePlan], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, planned: tuple[Plan, Plan], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(arm_state, "configure", lambda *_: None)
     plan, sequence = planned
@@ -86,7 +86,7 @@ def test_a_plan_is_old_when_its_frame_is_elsewhere(
 
 
 def test_a_sequence_takes_a_plan_unless_its_own_frame_is_elsewhere(
-    tmp_path: Path, planned: tuple[Plan, SequencePlan]
+    tmp_path: Path, planned: tuple[Plan, Plan]
 ) -> None:
     """Teaching a posture or a frame makes no other plan old."""
     plan, _ = planned
@@ -111,7 +111,7 @@ def test_a_sequence_takes_a_plan_unless_its_own_frame_is_elsewhere(
 
 
 def test_run_and_upload_refuse_an_old_plan_before_a_port_is_opened(
-    tmp_path: Path, planned: tuple[Plan, SequencePlan]
+    tmp_path: Path, planned: tuple[Plan, Plan]
 ) -> None:
     plan, sequence = planned
     plan.save(tmp_path / "plan.json")
@@ -129,9 +129,7 @@ def test_run_and_upload_refuse_an_old_plan_before_a_port_is_opened(
             assert "nowhere" not in result.output
 
 
-def test_fetch_refuses_a_sequence_before_a_port_is_opened(
-    tmp_path: Path, planned: tuple[Plan, SequencePlan]
-) -> None:
+def test_fetch_refuses_a_sequence_before_a_port_is_opened(tmp_path: Path, planned: tuple[Plan, Plan]) -> None:
     planned[1].save(tmp_path / "sequence.json")
     result = cli("fetch", str(tmp_path / "sequence.json"), "--port", "nowhere")
     assert (result.exit_code, "samples of a sequence are not kept" in result.output) == (2, True), (

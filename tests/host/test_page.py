@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.cli.results import ProgressBar
-from armtempo.cli.run_progress import RunProgress
+from armtempo.cli.run import RunProgress
 from armtempo.cli.sequences import StateLine
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_plan
 from armtempo.kinematics import chain
 from armtempo.link.board_messages import Positions, Sample, SequenceState
 from armtempo.paper import searches
@@ -153,7 +153,7 @@ def sample(time_s: float, off_deg: float) -> Sample:
 def test_angles_and_errors_stand_beside_the_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     notes: list[Any] = []
     with RunProgress() as live:
-        live.begin(encoded_motion.of_plan(shipped_plan()), FOLDER)
+        live.begin(encoded_plan.of_plan(shipped_plan()), FOLDER)
         monkeypatch.setattr(live, "_progress", lambda *shown: notes.append(shown))
         live.on_sample(sample(3.0, 0.9), 6.8)
         monkeypatch.undo()

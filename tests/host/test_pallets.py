@@ -14,18 +14,17 @@ from armtempo.basics import json_codec
 from armtempo.basics.errors import InputError, LinkError, PlanError
 from armtempo.cli import sequences
 from armtempo.diagnosis import geometry
-from armtempo.encoding import encode, encoded_sequence, flash_use, planned_for
+from armtempo.encoding import encode, encoded_plan, flash_use, made_with
 from armtempo.kinematics.of_arm import forward
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model import shipped
 from armtempo.model.arm import Arm
 from armtempo.model.pallet import ArmPallet
+from armtempo.model.plan import Plan
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.model.steps import EachPlace, ToPlace
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner, point_to_point, via_points
-from armtempo.planning.pallet_places import resolve
 from armtempo.robot import store
 
 ARM_TEXT = shipped.find("ar4").path.read_text(encoding="utf-8")
@@ -87,7 +86,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(planner, "plan", plan)
 
 
-def planned(folder: Path, steps: str = STEPS, more: str = TRAY, top: str = 'start = "home"') -> SequencePlan:
+def planned(folder: Path, steps: str = STEPS, more: str = TRAY, top: str = 'start = "home"') -> Plan:
     """The plan of a sequence of these steps."""
     path = folder / "s.toml"
     path.write_text(f'name = "s"\n{top}\n{steps}', encoding="utf-8")
@@ -95,11 +94,11 @@ def planned(folder: Path, steps: str = STEPS, more: str = TRAY, top: str = 'star
     return armtempo.plan_sequence(found, Sequence.load(path, found))
 
 
-def ends_mm(plan: SequencePlan) -> list[list[float]]:
+def ends_mm(plan: Plan) -> list[list[float]]:
     """Where the tool is at the end of each motion, in the frame of the tray."""
     in_tray = np.linalg.inv(plan.arm.frame("tray"))
     found = []
-    for leg in plan.legs:
+    for _, leg in plan.loaded_legs:
         angles = list(plan.arm.all_home_deg)
         for joint, angle in zip(plan.arm.driven_indices, leg(leg.duration_s), strict=True):
             angles[joint] = float(angle)
@@ -200,7 +199,7 @@ def test_within_another_repeat_it_is_done_again(tmp_path: Path, quick: None) -> 
     plan = planned(tmp_path, steps, SMALL)
     assert sum("output" in row.words for row in plan.rows) == 6, "the first pass comes from home"
     assert [cycle.times for cycle in plan.cycles] == [0]
-    encoded_sequence.of_plan(plan)
+    encoded_plan.of_plan(plan)
 
 
 @pytest.mark.slow
@@ -266,19 +265,19 @@ def test_the_solutions_of_all_places_are_near_each_other() -> None:
     ar4 = Arm.load("ar4")
     first = Pose.of_matrix(forward(ar4, [10, 10, 20, 170, 40, -150]))
     pallet = ArmPallet("tray", first, rows=3, columns=3, row_mm=20.0, column_mm=-15.0)
-    above = np.array([place.above_deg for place in resolve(ar4, pallet)])
+    above = np.array([place.above_deg for place in via_points.places(ar4, pallet)])
     assert np.abs(np.diff(above, axis=0)).max() < 30.0
 
 
 def test_one_that_has_changed_makes_a_plan_old(tmp_path: Path, quick: None) -> None:
     plan = planned(tmp_path, more=SMALL)
-    planned_for.check("s.json", plan, arm(tmp_path, SMALL))
+    made_with.check_plan("s.json", plan, arm(tmp_path, SMALL))
     with pytest.raises(InputError, match=r"s.json is old: pallet 'tray' has changed since"):
-        planned_for.check("s.json", plan, arm(tmp_path, SMALL.replace("column_mm = 12", "column_mm = 13")))
+        made_with.check_plan("s.json", plan, arm(tmp_path, SMALL.replace("column_mm = 12", "column_mm = 13")))
     with pytest.raises(InputError, match="pallet 'tray' has changed since, or is gone"):
-        planned_for.check("s.json", plan, arm(tmp_path, SMALL.replace("[pallet.tray]", "[pallet.other]")))
+        made_with.check_plan("s.json", plan, arm(tmp_path, SMALL.replace("[pallet.tray]", "[pallet.other]")))
     with pytest.raises(InputError, match="frame 'tray' has changed since"):
-        planned_for.check("s.json", plan, arm(tmp_path, SMALL.replace("330", "331")))
+        made_with.check_plan("s.json", plan, arm(tmp_path, SMALL.replace("330", "331")))
 
 
 class Flash:
@@ -306,8 +305,8 @@ class Flash:
 
 
 def test_what_the_flash_cannot_take_is_refused_before_anything_is_stored(tmp_path: Path, quick: None) -> None:
-    encoded = encoded_sequence.of_plan(planned(tmp_path, more=SMALL))
-    sizes = [len(motion.data) for motion in encoded.motions] + [len(encoded.data)]
+    encoded = encoded_plan.of_plan(planned(tmp_path, more=SMALL))
+    sizes = [len(motion.data) for motion in encoded.legs] + [len(encoded.data)]
     needed = sum(map(flash_use.in_blocks, sizes))
     with_names = flash_use.of_plan(encoded.plan)
     assert needed < with_names < needed + 10 * 4 * 32
@@ -335,33 +334,38 @@ rpy_deg = [180, 0, 0]
 """
 
 
-def tool_at_ends(plan: SequencePlan) -> list[np.ndarray]:
+def tool_at_ends(plan: Plan) -> list[np.ndarray]:
     """Where the tool of each motion is at its end."""
     return [forward(on, leg(leg.duration_s)) for on, leg in plan.loaded_legs]
+
+
+def tools_of(plan: Plan) -> list[str]:
+    return [leg.tool for leg in plan.legs]
 
 
 def test_a_step_changes_the_tool_of_the_motions_after_it(tmp_path: Path, quick: None) -> None:
     steps = '[[step]]\ngoto = "over"\n[[step]]\ntool = "pen"\n[[step]]\ngoto = "over"\n'
     plan = planned(tmp_path, steps + STEPS.replace("leave", "place"), SMALL + TOOLS)
-    assert plan.tools == ("nothing", *("pen",) * (len(plan.legs) - 1))
+    assert tools_of(plan) == ["nothing", *["pen"] * (len(plan.legs) - 1)]
     over = np.array(plan.arm.posture("over").where.matrix)  # type: ignore[union-attr]
-    for there in tool_at_ends(plan)[:2]:
-        np.testing.assert_allclose(there, over, atol=0.1)
-    assert not np.allclose(plan.legs[1](0.0), plan.legs[1](plan.legs[1].duration_s), atol=0.1)
+    for at_end in tool_at_ends(plan)[:2]:
+        np.testing.assert_allclose(at_end, over, atol=0.1)
+    there = plan.legs[1].trajectory
+    assert not np.allclose(there(0.0), there(there.duration_s), atol=0.1)
     place = np.array(plan.arm.pallets[0].pose(1, plan.arm.frames).matrix)
     np.testing.assert_allclose(tool_at_ends(plan)[3], place, atol=0.1)
     plan.save(tmp_path / "s.json")
-    assert SequencePlan.load(tmp_path / "s.json").tools == plan.tools
+    assert tools_of(Plan.load(tmp_path / "s.json")) == tools_of(plan)
     changed = arm(tmp_path, SMALL + TOOLS.replace("[0, 0, 10]", "[0, 0, 11]"))
     with pytest.raises(InputError, match=r"s.json is old: tool 'pen' has changed since, or is gone"):
-        planned_for.check("s.json", plan, changed)
+        made_with.check_plan("s.json", plan, changed)
 
 
 def test_a_tool_that_changes_in_a_repeat_makes_its_first_pass_another(tmp_path: Path, quick: None) -> None:
     steps = '[[step]]\nrepeat = 5\n[[step]]\ngoto = "over"\n[[step]]\ntool = "pen"\n[[step]]\ngoto = "home"\n'
     plan = planned(tmp_path, f'{steps}[[step]]\nend = "repeat"\n', SMALL + TOOLS)
     assert [row.words for row in plan.rows].count("goto over") == 2
-    assert (plan.tools, plan.cycles[0].times) == (("nothing", "pen", "pen", "pen"), 5)
+    assert (tools_of(plan), plan.cycles[0].times) == (["nothing", "pen", "pen", "pen"], 5)
     with pytest.raises(
         InputError, match=r"step\[2\]\.tool: arm 'AR4-MK3' has no tool 'pin'; did you mean 'pen'"
     ):
@@ -377,6 +381,6 @@ def test_a_job_for_another_tool_is_refused_until_a_step_puts_it_on(tmp_path: Pat
         planned(tmp_path, run, SMALL + TOOLS)
     back = '[[step]]\ngoto = "home"\n[[step]]\ntool = "nothing"\n'
     with_tool = f'[[step]]\ntool = "pen"\n{run}{back}'
-    assert planned(tmp_path, with_tool, SMALL + TOOLS).tools == ("pen", "pen")
+    assert tools_of(planned(tmp_path, with_tool, SMALL + TOOLS)) == ["pen", "pen"]
     with pytest.raises(InputError, match="it is for tool 'pen', but the sequence has no tool here"):
         planned(tmp_path, with_tool + run, SMALL + TOOLS)

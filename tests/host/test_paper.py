@@ -18,6 +18,7 @@ from armtempo.report.evaluation import evaluate
 from armtempo.robot.stop_request import StopRequest
 
 from tests.host import made_runs
+from tests.plans import changed
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("paper")]  # what they share is made once
 
@@ -55,7 +56,7 @@ def test_a_plan_that_is_slower_differs_and_says_why(made: motions.Plans) -> None
     slow = motions.motion([float(via[0]) for via in made.job.via], [2.0] * 6, 5)  # type: ignore[index]
     joints = (slow, *made.quintic.trajectory.joints[1:])
     trajectory = replace(made.quintic.trajectory, joints=joints)
-    claims = motions.claims(replace(made, quintic=replace(made.quintic, trajectory=trajectory)))
+    claims = motions.claims(replace(made, quintic=changed(made.quintic, trajectory=trajectory)))
     total = next(claim for claim in claims if claim.what == "joint 1, motion time (s)")
     assert (total.verdict, total.found) == (DIFFERS, "12.0000")
     assert total.because
@@ -209,7 +210,7 @@ def test_the_three_motions_are_the_paper_s(
 
     monkeypatch.setattr(experiment, "_replayed", replayed)
     cubic = motions.motion([float(via[0]) for via in drawn.job.via], [1.0] * 6, 3)  # type: ignore[index]
-    plan = replace(drawn.cubic, trajectory=replace(drawn.cubic.trajectory, joints=(cubic,) * 3))
+    plan = changed(drawn.cubic, trajectory=replace(drawn.cubic.trajectory, joints=(cubic,) * 3))
     experiment.run(replace(drawn, cubic=plan), tmp_path, False, None)
     assert seen[UNOPTIMISED] == (5, pytest.approx(12.0), 10)
     assert seen[CUBIC][0] == 3

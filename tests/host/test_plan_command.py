@@ -35,6 +35,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("move.toml").write_text(POINT_TO_POINT)
 
 
+@pytest.mark.slow
 def test_plans_the_shipped_job_without_options() -> None:
     result = run("--iterations", "20")
     assert result.exit_code == 0, result.output
@@ -236,6 +237,7 @@ def test_no_part_is_written_where_a_later_one_would_be_refused() -> None:
     assert Path("move-2.json").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_motion_too_long_for_the_board_ends_with_1_and_is_split_on_request() -> None:
     """Beyond 3272 s; joint 1 at 0.012 deg/s takes about 1700 s to each via point."""
     text = shipped.files()[shipped.PAPER].read_text()
@@ -270,6 +272,7 @@ def test_says_what_is_wrong_with_an_option(options: str, message: str) -> None:
     assert message in result.output
 
 
+@pytest.mark.slow
 def test_a_job_that_does_not_say_otherwise_is_planned_on_a_free_path() -> None:
     Path("bent.toml").write_text('name = "bent"\nvia_deg = [[0, -60, 40], [20, -75, 50], [25, -75, 50]]\n')
     result = run("--job", "bent.toml")

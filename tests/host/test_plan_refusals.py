@@ -52,13 +52,14 @@ def test_no_plan_goes_beyond_a_switch_within_the_range() -> None:
         replace(ARM, joints=(replace(ARM.joints[0], switches=switches), *ARM.joints[1:]))
         for switches in (LimitSwitches(low=1, low_deg=0.0), LimitSwitches(low="PD0", low_deg=0.0))
     ]
-    job = Job("back", via=((20.0, -60.0, 40.0), (-5.0, -60.0, 40.0)))
+    job = Job("back", via=((20.0, -60.0, 40.0), (-5.0, -60.0, 40.0)), path="through", iterations=5)
     with pytest.raises(PlanError, match="beyond its low switch, which stops it at 0"):
         planner.plan(arms[0], job)
     assert planner.plan(arms[1], job).total_s  # read while homing only
     assert planner.plan(arms[0], replace(job, via=((20.0, -60.0, 40.0), (0.0, -60.0, 40.0)))).total_s
 
 
+@pytest.mark.slow
 def test_no_motor_is_faster_than_its_torque_curve_goes() -> None:
     """Joint 1 at 40 deg/s is 13.3 rpm."""
     first = ARM.joints[0]

@@ -13,7 +13,7 @@ from typing import Any, cast
 import armtempo
 import numpy as np
 import pytest
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_plan
 from armtempo.robot.motions import Motions
 from armtempo.robot.outputs import BoardIO
 from armtempo.robot.position import ArmPosition
@@ -31,14 +31,14 @@ WRONG = (
     *([], [[]], [1.0, 2.0], [1, "x"], [[1, 2, 3], [4]], {}, {"x": object()}),
     *(np.zeros((2, 2)), np.array(["x"])),
 )
-GIVEN_BY_US = {"Board", "BoardState", "Plan", "Run", "SequencePlan", "SharedBoard", "Stopped"}
+GIVEN_BY_US = {"Board", "BoardState", "Plan", "Run", "SharedBoard", "Stopped"}
 GIVEN_BY_US |= {"StopRequest", "Trajectory", "Watcher", "Result", "VirtualBoard"}
 """Classes that a user makes no objects of, or without arguments."""
 USERS_OWN = {"minimise.function", "minimise.rng", "launch.options"}
 """What these raise or start is the user's affair."""
 NO_CALLS = {"BoardState.of_json", "StopRequest.ask", "StopRequest.check"}
-NO_CALLS |= {"Arm.of_table", "Job.of_table", "Sequence.of_table", "Arm.read_posture"}
-NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "on_sample", "end")}
+NO_CALLS |= {"Arm.of_table", "Job.of_table", "Plan.of_job", "Sequence.of_table", "Arm.read_posture"}
+NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "on_sample", "on_state", "end")}
 
 
 class Gone:
@@ -75,7 +75,6 @@ def objects(plan: armtempo.Plan) -> dict[str, Any]:
         "Spline": armtempo.Spline.through([0, 1, 2]),
         "Trajectory": plan.trajectory,
         "Sequence": sequence,
-        "SequencePlan": armtempo.plan_sequence(ARM, sequence),
         "Output": armtempo.Output("gripper", "switch", "PE9", 0.0),
     }
 
@@ -132,7 +131,7 @@ def good(plan: armtempo.Plan) -> dict[str, Any]:
         "motor": armtempo.Motor(1, 200, 16, 10),
         "sequence": armtempo.Sequence("s", (armtempo.Wait(1.0),)),
         "steps": (armtempo.Wait(1.0),),
-        "motion": encoded_motion.of_plan(plan),  # once: to find its brake time takes a while
+        "motion": encoded_plan.of_plan(plan),  # once: to find its brake time takes a while
     }
 
 

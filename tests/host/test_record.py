@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import ArmtempoError, InputError, RunFolderError
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_plan
 from armtempo.link.board_messages import Positions, Sample
 from armtempo.model.arm import Arm
 from armtempo.report import run_folder, run_reader, run_report
@@ -69,7 +69,7 @@ def test_whole_run(tmp_path: Path) -> None:
     assert first.commanded_steps[:, 1].tolist() == [0, -1, -2, -3, -4]
     np.testing.assert_allclose(first.angle_deg[4], [12 * 0.09, -12 * 0.09, 7 * 0.09], atol=1e-6)
     assert found.meta["repetitions"][0]["duration_s"] == pytest.approx(0.4)
-    assert found.trajectory_path is None
+    assert found.plan_path is None
     header = (run.path / "samples-01.csv").read_text().splitlines()[0].split(",")
     assert header == list(found.meta["columns"])
 
@@ -152,7 +152,7 @@ def test_a_folder_that_the_disk_has_no_room_for_is_not_left_behind(
 ) -> None:
     """The disk is full at each write of a new run's, one after the other."""
     board, _ = ready(Pipe(tmp_path / "flash"))
-    motion = encoded_motion.of_plan(made_runs.shipped_plan())
+    motion = encoded_plan.of_plan(made_runs.shipped_plan())
     writes = (Path, "write_bytes"), (os, "fsync"), (os, "replace")
     for place, name in writes:
         with monkeypatch.context() as change:
@@ -257,19 +257,25 @@ def spoil_table(path: Path, numbers: random.Random) -> None:
 
 @pytest.mark.long
 @pytest.mark.slow
+@pytest.mark.parametrize("of_sequence", [False, True])
 def test_a_damaged_run_folder_is_read_or_refused_in_words(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of_sequence: bool
 ) -> None:
     """Random damage to each of its files: no traceback, no number that is none."""
     seed = 37
     print("seed", seed)
     numbers = random.Random(seed)
     made_runs.draw_nothing(monkeypatch)
-    whole = made_runs.make(tmp_path / "whole", repetitions=2)
+    if of_sequence:
+        whole, cases = made_runs.make_sequence(tmp_path / "whole"), 40
+    else:
+        whole, cases = made_runs.make(tmp_path / "whole", repetitions=2), 120
     refused = 0
-    for number in range(120):
+    for number in range(cases):
         folder = shutil.copytree(whole, tmp_path / "damaged", dirs_exist_ok=True)
-        name = numbers.choice(("run.json", "samples-01.csv", "samples-02.csv"))
+        name = numbers.choice(
+            ("run.json", "samples-01.csv", "rows-01.csv" if of_sequence else "samples-02.csv")
+        )
         (spoil_json if name.endswith("json") else spoil_table)(folder / name, numbers)
         try:
             found = run_reader.load(folder)
@@ -283,7 +289,7 @@ def test_a_damaged_run_folder_is_read_or_refused_in_words(
                 run_report.write(folder)
         except ArmtempoError:
             refused += 1
-    assert refused > 40
+    assert refused > cases // 4
 
 
 def test_two_runs_at_once_get_folders_of_their_own(tmp_path: Path) -> None:

@@ -216,6 +216,7 @@ def test_a_recording_that_begins_in_motion_is_slowed_far_down_or_refused() -> No
         recorded.plan(ARM, "moving", 50.0 * TIMES[:40], line, tolerance_deg=1e-4)
 
 
+@pytest.mark.slow
 def test_the_commands_take_recordings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("move.json").write_text(json.dumps(message(TIMES, MOVE(TIMES))))

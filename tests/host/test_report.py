@@ -26,6 +26,7 @@ from click.testing import CliRunner
 
 from tests import browser
 from tests.host import made_runs
+from tests.plans import changed
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("report")]
 
@@ -386,7 +387,7 @@ def test_when_the_joints_pass_the_via_points_is_told(folder: Path) -> None:
 def test_shared_timing_needs_no_such_section(tmp_path: Path) -> None:
     path = made_runs.make(tmp_path / "run", repetitions=1)
     spoil_plan(
-        path, lambda plan: replace(plan, job=replace(plan.job, timing="shared"), notes=("by way of X",))
+        path, lambda plan: changed(plan, job=replace(plan.job, timing="shared"), notes=("by way of X",))
     )
     run_report.write(path)
     text = (path / run_report.PAGE).read_text()

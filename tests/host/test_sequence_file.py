@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.cli import sequences
-from armtempo.encoding import encoded_sequence
+from armtempo.encoding import encoded_plan
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import shipped
+from armtempo.model import plan_file, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.plan import PAUSE_S, Plan
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import PAUSE_S, SequencePlan
 from armtempo.planning import via_points
+from armtempo.splines.trajectory import Trajectory
 from armtempo_shared import sequence as record
 from armtempo_shared import sequence_check
 
@@ -43,19 +44,24 @@ def written(folder: Path, *steps: str, top: str = "", name: str = "seq") -> Path
     return path
 
 
-def planned(folder: Path, *steps: str, top: str = 'start = "home"') -> SequencePlan:
+def planned(folder: Path, *steps: str, top: str = 'start = "home"') -> Plan:
     """The plan of such a file."""
     return armtempo.plan_sequence(ARM, Sequence.load(written(folder, *steps, top=top), ARM))
 
 
-def words(plan: SequencePlan) -> list[str]:
+def words(plan: Plan) -> list[str]:
     """What its rows do."""
     return [row.words for row in plan.rows]
 
 
-def ends(plan: SequencePlan) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
+def motions(plan: Plan) -> list[Trajectory]:
+    """Its different motions."""
+    return [leg.trajectory for leg in plan.legs]
+
+
+def ends(plan: Plan) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
     """Where each motion begins and ends."""
-    return [(tuple(leg(0.0)), tuple(leg(leg.duration_s))) for leg in plan.legs]
+    return [(tuple(leg(0.0)), tuple(leg(leg.duration_s))) for leg in motions(plan)]
 
 
 @pytest.mark.slow
@@ -68,7 +74,7 @@ def test_where_a_motion_swings_beyond_its_via_points_is_told(tmp_path: Path) -> 
     assert note.startswith("j: between P0 and P1 joint 1 reaches ")
     assert f"note: {note}" in sequences.lines(plan)
     plan.save(tmp_path / "plan.json")
-    assert SequencePlan.load(tmp_path / "plan.json").notes == plan.notes
+    assert Plan.load(tmp_path / "plan.json").notes == plan.notes
     assert planned(tmp_path, 'goto = "a"', 'run = "job.toml"').notes == ()
 
 
@@ -100,8 +106,8 @@ def test_a_goto_in_a_line_moves_the_tool_straight_and_slowly(tmp_path: Path) -> 
     line = "goto = [6, -60, 40]\nline = true\nspeed_mm_s = 20"
     plan = planned(tmp_path, 'goto = "a"', line, line)
     assert words(plan) == ["goto a", "line to 6, -60, 40°"]
-    times = np.linspace(0.0, plan.legs[1].duration_s, 2001)
-    way = forward(ARM, plan.legs[1](times))[:, :3, 3]
+    times = np.linspace(0.0, motions(plan)[1].duration_s, 2001)
+    way = forward(ARM, motions(plan)[1](times))[:, :3, 3]
     along = (way[-1] - way[0]) / np.linalg.norm(way[-1] - way[0])
     assert np.abs(np.cross(way - way[0], along)).max() < 0.5
     assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() / times[1] == pytest.approx(20.0, rel=0.01)
@@ -130,7 +136,7 @@ def test_the_first_pass_of_a_repeat_may_begin_elsewhere(tmp_path: Path) -> None:
     assert (cycle.times, cycle.share.motions) == (3, 2)
     assert plan.total is not None
     assert plan.total.motions == 7
-    whole = sum(plan.legs[n].duration_s for n in (0, 1, 2, 1, 2, 1, 3)) + 7 * PAUSE_S
+    whole = sum(motions(plan)[n].duration_s for n in (0, 1, 2, 1, 2, 1, 3)) + 7 * PAUSE_S
     assert plan.total.total_s == pytest.approx(whole)
 
 
@@ -154,7 +160,7 @@ def test_repeats_within_repeats(tmp_path: Path) -> None:
     assert values == [(5, 0, 0), (5, 0, 1), (6, 0, 0), (6, 1, 0)]
     assert plan.total is None
     assert plan.cycles[0].times == 0
-    sequence_check.check(record.SequenceData(encoded_sequence.of_plan(plan).data))
+    sequence_check.check(record.SequenceData(encoded_plan.of_plan(plan).data))
 
 
 def test_outputs_waits_and_inputs(tmp_path: Path) -> None:
@@ -219,12 +225,12 @@ def test_a_counter_is_one_by_its_name(tmp_path: Path) -> None:
         'end = "repeat"',
     )
     assert plan.counters == ("trays", "parts", "called")
-    data = record.SequenceData(encoded_sequence.of_plan(plan).data)
+    data = record.SequenceData(encoded_plan.of_plan(plan).data)
     assert [data.counter(number) for number in range(data.counters)] == [b"trays", b"parts", b"called"]
     counted = [row.words for row in plan.rows if row.op == record.COUNT]
     assert counted == ["count trays", "count parts", "count called", "count parts"] * 2
     plan.save(tmp_path / "seq.json")
-    assert SequencePlan.load(tmp_path / "seq.json").counters == plan.counters
+    assert Plan.load(tmp_path / "seq.json").counters == plan.counters
 
 
 def test_more_counters_than_the_board_keeps_are_refused(tmp_path: Path) -> None:
@@ -324,8 +330,8 @@ def test_the_file_of_a_plan_holds_all_of_it(tmp_path: Path) -> None:
     plan = planned(tmp_path, 'goto = "a"', 'output = "gripper"\nto = "open"', "wait_s = 0.5")
     path = tmp_path / "seq.json"
     plan.save(path)
-    again = SequencePlan.load(path)
-    assert encoded_sequence.of_plan(again).data == encoded_sequence.of_plan(plan).data
+    again = Plan.load(path)
+    assert encoded_plan.of_plan(again).data == encoded_plan.of_plan(plan).data
     assert again.total == plan.total
     plan.save(path)  # an earlier plan of the same sequence gives way
     with pytest.raises(InputError, match="exists with other content"):
@@ -334,25 +340,48 @@ def test_the_file_of_a_plan_holds_all_of_it(tmp_path: Path) -> None:
     content["sequence"]["rows"][0]["number"] = 7
     path.write_text(json.dumps(content))
     with pytest.raises(InputError, match=r"altered .* --altered"):
-        SequencePlan.load(path)
+        Plan.load(path)
     with pytest.raises(InputError, match="a motion or counter that does not exist"):
-        SequencePlan.load(path, altered=True)
+        Plan.load(path, altered=True)
     with pytest.raises(InputError, match="exists with other content"):
         plan.save(path)  # what somebody altered is not thrown away
     path.write_text(path.read_text()[:-50])
     with pytest.raises(InputError, match="damaged or cut"):
-        SequencePlan.load(path)
+        Plan.load(path)
 
 
-def test_a_trajectory_file_is_no_sequence_and_the_other_way_round(tmp_path: Path) -> None:
-    plan = planned(tmp_path, 'goto = "a"')
+def test_one_plan_type_reads_both_files_and_takes_no_sequence_for_a_motion(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'goto = "a"', "wait_s = 1")
     plan.save(tmp_path / "seq.json")
     motion = armtempo.plan(ARM, Job.load(tmp_path / "job.toml", ARM))
     motion.save(tmp_path / "j.json")
-    with pytest.raises(InputError, match="is not a planned sequence"):
-        SequencePlan.load(tmp_path / "j.json")
-    with pytest.raises(InputError, match="is not a trajectory file"):
-        armtempo.Plan.load(tmp_path / "seq.json")
+    found = [Plan.load(tmp_path / name) for name in ("seq.json", "j.json")]
+    assert [(each.name, each.is_sequence, len(each.legs)) for each in found] == [
+        (plan.name, True, 1),
+        (motion.name, False, 1),
+    ]
+    assert [row.words for row in found[1].rows] == [f"run {motion.name}"]
+    for of_a_motion in ("trajectory", "total_s", "job", "via_deg", "searches", "extremes"):
+        getattr(found[1], of_a_motion)
+        with pytest.raises(InputError, match=r"is a sequence"):
+            getattr(found[0], of_a_motion)
+    with pytest.raises(InputError, match=r"seq\.json: is the plan of a sequence, not of a motion"):
+        planned(tmp_path, 'run = "seq.json"')
+
+
+def test_each_leg_of_a_file_has_its_load_or_none_has(tmp_path: Path) -> None:
+    path = tmp_path / "seq.json"
+    planned(tmp_path, 'goto = "a"', 'goto = "home"').save(path)
+    content = json.loads(path.read_text())["sequence"]
+    for loads, fits in (([], True), (["", ""], True), ([""], False)):
+        changed = {**content, "loads": loads}
+        head = {"format": "armtempo sequence", "version": 2, "sha256": plan_file.checksum(changed)}
+        path.write_text(json.dumps({**head, "sequence": changed}))
+        if fits:
+            assert [leg.load for leg in Plan.load(path).legs] == ["", ""]
+        else:
+            with pytest.raises(InputError, match="an entry for each of 2 motions"):
+                Plan.load(path)
 
 
 def test_a_plan_of_another_arm_is_no_leg(tmp_path: Path) -> None:
@@ -363,7 +392,7 @@ def test_a_plan_of_another_arm_is_no_leg(tmp_path: Path) -> None:
 
 
 def test_every_damage_of_a_record_is_seen(tmp_path: Path) -> None:
-    data = encoded_sequence.of_plan(planned(tmp_path, 'goto = "a"', "wait_s = 1")).data
+    data = encoded_plan.of_plan(planned(tmp_path, 'goto = "a"', "wait_s = 1")).data
     record.SequenceData(data)
     for at in range(len(data)):
         for damaged in (data[:at], data[:at] + bytes([data[at] ^ 0x40]) + data[at + 1 :]):
@@ -382,4 +411,4 @@ def test_the_shipped_sequence_plans() -> None:
     sequence = Sequence.load(FOLDER / "sequence.toml", ARM)
     plan = armtempo.plan_sequence(ARM, sequence)
     assert plan.start_deg == pytest.approx(ARM.home_deg)
-    assert len({leg.name for leg in plan.legs}) == len(plan.legs) == 8
+    assert len({leg.name for leg in motions(plan)}) == len(plan.legs) == 8

@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 from armtempo.basics.errors import LinkError
-from armtempo.encoding import encoded_sequence
-from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
-from armtempo.encoding.encoded_sequence import EncodedSequence
+from armtempo.encoding import encoded_plan
+from armtempo.encoding.encoded_plan import Encoded, EncodedLeg, MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import RowBegun, Sample
 from armtempo.link.follow import Followed, SequenceFollower, SequenceWatcher
@@ -99,13 +98,14 @@ def test_a_watcher_sees_a_sequence_as_a_motion(tmp_path: Path) -> None:
     pipe.run_samples = 4
     board, key = sequence_of(pipe, 2)
     arm = Arm.paper()
-    leg = EncodedMotion("feed", arm, straight("feed", [0.0] * 3, [1.0] * 3, arm), board.fetch("feed"))
-    rows = encoded_sequence.described(sequence.SequenceData(board.fetch(key.name)), arm)
-    encoded = EncodedSequence(key.name, arm, (leg,), rows, board.fetch(key.name))
+    leg = EncodedLeg("feed", straight("feed", [0.0] * 3, [1.0] * 3, arm), board.fetch("feed"))
+    rows = encoded_plan.described(sequence.SequenceData(board.fetch(key.name)), arm)
+    encoded = Encoded(key.name, arm, (leg,), rows, board.fetch(key.name))
     folder = recording.new_run(tmp_path / "runs", encoded, "pipe", board)
     seen, states = Counting(), list[str]()
     with recording.repetition(board, encoded, folder, seen) as recorder:
-        recorder.end_rows(run(board, key, recorder.take, lambda state: states.append(state.ending)))
+        followed = run(board, key, recorder.take, lambda state: states.append(state.ending))
+        recorder.end(followed.end, followed.lost, stopped=False)
     assert seen.samples == [(index, leg.trajectory.duration_s) for index in range(4)] * 2
     assert seen.ended == states[-1:] == ["finished"]
     assert [row.passed for row in Run.load(folder.path).rows] == [1, 2, 3, 4, 5]

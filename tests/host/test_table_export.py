@@ -47,12 +47,12 @@ def test_ros_points_are_in_radians_and_in_order() -> None:
     assert "time_from_start: {sec: 0, nanosec: 100000000}" in text
 
 
-@pytest.mark.parametrize("rate", [1.0, 100.0, 333.3, 1e5])
+@pytest.mark.parametrize("rate", [10.0, 333.3, 1e5])
 @pytest.mark.parametrize("more_s", [-3e-10, 0.0, 3e-10, 1e-8, 1e-6])
 def test_stamps_rise_in_nanoseconds(rate: float, more_s: float) -> None:
-    stamps = [round(1e9 * time) for time in exchange.times_s(1.0 + more_s, rate)]
+    stamps = [round(1e9 * time) for time in exchange.times_s(0.1 + more_s, rate)]
     assert stamps == sorted(set(stamps))
-    assert stamps[-1] == round(1e9 * (1.0 + more_s))
+    assert stamps[-1] == round(1e9 * (0.1 + more_s))
 
 
 def test_exports_give_back_the_same_numbers() -> None:

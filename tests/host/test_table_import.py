@@ -57,6 +57,36 @@ def test_a_recording_within_a_turn_goes_on(tmp_path: Path, start: int, end: int,
         assert "recorded within a turn" in found.notes[-1]
 
 
+def test_a_recording_within_a_turn_may_be_faster_than_the_limit(tmp_path: Path) -> None:
+    """As anywhere else in it, if it is as fast before and after the jump."""
+    table = tmp_path / "recorded.csv"
+    table.write_text(recording(within_a_turn(angle) for angle in np.arange(100.0, 251.0, 10.0)))
+    assert via_table.read(table, WIDE).via_deg[[0, -1], 0] == pytest.approx([100.0, 250.0])
+
+
+@pytest.mark.parametrize("at_end", [False, True])
+def test_a_rest_beside_less_than_a_step_is_left_out_or_refused(tmp_path: Path, at_end: bool) -> None:
+    """The planner takes its two ends for one point, at which it keeps no rest."""
+    table = tmp_path / "recorded.csv"
+    angles = [0.0, 0.01, 0.02, *[0.02] * 15, *np.linspace(0.02, 60.0, 40)]
+    table.write_text(recording(angles[::-1] if at_end else angles))
+    found = via_table.read(table, ARM)
+    assert not found.rests_s
+    assert found.via_deg[[0, -1], 0] == pytest.approx([60.0, 0.02] if at_end else [0.02, 60.0], abs=0.01)
+    assert found.thinned_to_deg is not None
+    assert found.thinned_to_deg >= 0.01
+    with pytest.raises(InputError, match=f"its {'last' if at_end else 'first'} move, of 0.02 degrees"):
+        via_table.read(table, ARM, tolerance_deg=0.005)
+
+
+def test_a_point_beyond_a_range_is_named_with_its_line(tmp_path: Path) -> None:
+    table = tmp_path / "recorded.csv"
+    for least in (-10.05, -10.3):
+        table.write_text(recording(np.linspace(least, 60.0, 40)))
+        with pytest.raises(InputError, match=f"line 2: joint 1 at {least} degrees is outside of its range"):
+            via_table.read(table, ARM)
+
+
 def test_a_recording_that_cannot_go_on_is_refused_with_its_line(tmp_path: Path) -> None:
     table = tmp_path / "recorded.csv"
     table.write_text(recording([176, 178, -180, -178]))

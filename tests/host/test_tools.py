@@ -13,7 +13,7 @@ from armtempo import pipeline
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.encoding import encode, planned_for
+from armtempo.encoding import encode, made_with
 from armtempo.kinematics import dynamics
 from armtempo.kinematics.forward import forward as of_geometry
 from armtempo.kinematics.geometry import Geometry
@@ -115,6 +115,7 @@ def test_the_inverse_brings_the_tool_to_the_pose(arm: Arm) -> None:
         np.testing.assert_allclose(forward(tooled, many.nearest_deg), poses, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_jogs_turn_about_the_tools_point_and_lines_are_of_it() -> None:
     tooled, _ = both(Arm.load("ar4"))
     here = [10.0, 10.0, -20.0, 5.0, 60.0, 0.0]
@@ -268,9 +269,10 @@ def test_a_job_chooses_its_tool_and_a_plan_is_old_without_it(tmp_path: Path) -> 
         pipeline.load(tmp_path / "plan.json", changed)
     with pytest.raises(InputError, match=r"job.toml: tool: .* no tool 'griper'; did you mean 'gripper'"):
         Job.of_table(toml_table.parse(text.replace("gripper", "griper"), "job.toml"), arm)
-    planned_for.check("x", replace(plan, arm=arm), changed)
+    made_with.check_plan("x", replace(plan, arm=arm), changed)
 
 
+@pytest.mark.slow
 def test_a_sequence_begins_with_its_tool(tmp_path: Path) -> None:
     arm = Arm.load(arm_file(tmp_path))
     (tmp_path / "job.toml").write_text(f'tool = "gripper"\n{JOB}', encoding="utf-8")
@@ -288,7 +290,7 @@ def test_a_sequence_begins_with_its_tool(tmp_path: Path) -> None:
         found = planned(arm, f'tool = "gripper"\n{text}', tmp_path)
         assert found.arm.tool == arm.tools[0]
         assert len(found.legs) == 2
-        end = forward(found.arm, found.legs[1](found.legs[1].duration_s))[:3, 3]
+        end = forward(found.arm, found.legs[1].trajectory(found.legs[1].trajectory.duration_s))[:3, 3]
         np.testing.assert_allclose(end, there, atol=0.1)
 
 
@@ -309,6 +311,7 @@ def test_commands_take_a_tool(tmp_path: Path) -> None:
         assert "no tool 'griper'; did you mean 'gripper'" in " ".join(result.output.split())
 
 
+@pytest.mark.slow
 def test_a_posture_as_a_pose_is_of_the_tool_that_is_on(tmp_path: Path) -> None:
     there = forward(Arm.load(arm_file(tmp_path)).with_tool("pen"), [20, 10, -10, 5, 40, 8])[:3, 3].tolist()
     arm = Arm.load(arm_file(tmp_path, f"{TOOL}\n[posture.over]\nposition_mm = {there}\n")).with_tool("pen")

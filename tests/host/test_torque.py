@@ -19,6 +19,8 @@ from armtempo.planning import planner, torque
 from armtempo.planning.planner import slower
 from armtempo.report import run_report, text_summary
 
+from tests.plans import changed
+
 DATA = Path(__file__).parents[1] / "data"
 SEED = 20_261_124
 MASSES, LENGTHS, CENTRES, INERTIAS = (1.2, 0.7), (0.3, 0.2), (0.12, 0.11), (0.011, 0.004)
@@ -202,7 +204,7 @@ def test_plans_by_torque_leave_each_motor_what_is_prudent(monkeypatch: pytest.Mo
     def planned(arm: Arm, job: Job, progress: object) -> Plan:
         own, given = (one.driven[0].limits.acceleration_deg_s2 for one in (plan.arm, arm))
         faster = slower(plan.trajectory, min((given / own) ** 0.5, fastest))
-        return replace(plan, arm=arm, trajectory=faster)
+        return changed(plan, arm=arm, trajectory=faster)
 
     monkeypatch.setattr(planner, "plan", planned)
     found = torque.plan_by_torque(plan.arm, plan.job)

@@ -18,6 +18,8 @@ from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner
 
+from tests.plans import changed
+
 ARM = Arm.paper()
 JOB = replace(Job.paper(ARM), iterations=20, parameters={"a": 0.5, "variant": "paper"})
 
@@ -56,7 +58,7 @@ def test_is_enough_to_plan_again(path: Path) -> None:
 
 def test_keeps_poses(plan: Plan, tmp_path: Path) -> None:
     pose = Pose.of_angles((5.0, 6.0, 7.0), {"pitch": 20.0})
-    posed = replace(plan, job=replace(plan.job, via=(plan.job.via[0], pose)))
+    posed = changed(plan, job=replace(plan.job, via=(plan.job.via[0], pose)))
     posed.save(tmp_path / "posed.json")
     assert Plan.load(tmp_path / "posed.json").job == posed.job
 
@@ -233,10 +235,10 @@ def test_an_altered_file_in_a_run_folder_is_to_be_brought_back(path: Path) -> No
 
 
 def test_only_an_earlier_plan_of_the_same_job_and_arm_is_replaced(plan: Plan, path: Path) -> None:
-    replace(plan, job=replace(plan.job, seed=9)).save(path)
+    changed(plan, job=replace(plan.job, seed=9)).save(path)
     assert Plan.load(path).job.seed == 9
     for other in (
-        replace(plan, job=replace(plan.job, name="another")),
+        changed(plan, job=replace(plan.job, name="another")),
         replace(plan, arm=replace(plan.arm, name="another")),
     ):
         with pytest.raises(InputError, match=r"exists with other content.*the same job.*--force"):
@@ -244,7 +246,7 @@ def test_only_an_earlier_plan_of_the_same_job_and_arm_is_replaced(plan: Plan, pa
         assert Plan.load(path).job.seed == 9
         other.save(path.with_name("new.json"), force=True)
         other.save(path, force=True)
-        replace(plan, job=replace(plan.job, seed=9)).save(path, force=True)
+        changed(plan, job=replace(plan.job, seed=9)).save(path, force=True)
 
 
 def test_an_altered_plan_of_the_same_job_is_kept(plan: Plan, path: Path) -> None:

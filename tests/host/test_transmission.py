@@ -13,7 +13,7 @@ import pytest
 from armtempo.basics.errors import InputError
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.diagnosis.finding import Level
-from armtempo.encoding import decode, encode
+from armtempo.encoding import encode
 from armtempo.model import arm_json, drive_limits, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -24,7 +24,8 @@ from armtempo.planning import board_limits, checks, planner, point_to_point, tor
 from armtempo.planning.jog import jog_motion
 from armtempo.report import evaluation, run_folder, run_reader, run_report, verdict
 from armtempo.report.run import Run
-from armtempo.robot import arm_state
+from armtempo.robot import arm_state, goto
+from armtempo.robot.stop_request import StopRequest
 from armtempo_shared import armrecord, limits, motion
 
 from tests.host import made_runs
@@ -120,6 +121,19 @@ def test_unmeasured_motors_leave_joints_unmeasured() -> None:
     assert np.isnan(gears.count_deg[1])
 
 
+def test_a_goto_asks_for_the_position_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, moved = [], []
+
+    def status() -> Known:
+        asked.append(1)
+        return Known(SimpleNamespace(commanded_steps=tuple(PAPER.transmission.whole_steps(PAPER.home_deg))))
+
+    monkeypatch.setattr(goto, "move_once", lambda *given: moved.append(given))
+    there = np.array(PAPER.home_deg) + 5.0
+    goto.go_to(SimpleNamespace(status=status), PAPER, there, StopRequest())  # type: ignore[arg-type]
+    assert (len(asked), len(moved)) == (1, 1)
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_a_posture_at_the_ends_of_ranges_is_found_again_from_its_steps(seed: int) -> None:
     """Whole steps of the motors are up to half a step off, which the board allows; no joint leaves its range."""
@@ -193,7 +207,7 @@ def test_a_planned_motion_as_the_board_reads_it(path: str) -> None:
     wanted *= np.array([[joint.motor.steps_per_deg] for joint in THOR.driven])
     np.testing.assert_allclose(points, wanted, atol=1e-6)
     times = np.linspace(0.0, plan.trajectory.duration_s, 101)
-    back = decode.trajectory(data, THOR.transmission, "wrist")
+    back = encode.decoded(data, THOR.transmission, "wrist")
     np.testing.assert_allclose(back(times), plan.trajectory(times), atol=1e-6)
     most = np.abs(plan.trajectory(times, 1)).max(axis=0)
     assert np.all(most <= [20.0 * (1 + 1e-9)] * 6)
@@ -316,6 +330,7 @@ def test_its_file_names_each_finding() -> None:
         encode.arm_record(replace(THOR, joints=fast))
 
 
+@pytest.mark.slow
 def test_files_keep_the_coupling(tmp_path: Path) -> None:
     arm_json.save(THOR, tmp_path / "arm.json")
     assert arm_json.load(tmp_path / "arm.json") == THOR
@@ -350,7 +365,8 @@ def test_rows_of_the_file_are_those_of_motors() -> None:
     np.testing.assert_array_equal(np.array(THOR.coupling)[4:, 4:], WRIST)
 
 
-@pytest.mark.parametrize("on_board", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.slow
+@pytest.mark.parametrize("on_board", [False, True])
 def test_a_report_sees_the_joints(on_board: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps and counts of motors become angles of joints, also of a motion that only the board had."""
     made_runs.draw_nothing(monkeypatch)

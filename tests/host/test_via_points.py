@@ -164,6 +164,7 @@ def test_wrong_via_points_are_named(via: tuple[float, ...] | Pose, words: str) -
     assert words in str(caught.value)
 
 
+@pytest.mark.slow
 def test_plan_prints_the_notes(tmp_path: Path) -> None:
     rows = pose_of(20.0, -75.0, 50.0, 0.0, 30.0, 0.0).matrix
     file = tmp_path / "job.toml"

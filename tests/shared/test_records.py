@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from armtempo.model import arm_json, plan, sequence_plan
+from armtempo.model import arm_json, plan_file
 from armtempo.ports import claim_file
 from armtempo.report import run_folder
 from armtempo_shared import (
@@ -299,8 +299,8 @@ def test_a_motions_name_is_text() -> None:
 def test_versions_are_those_of_files_that_exist() -> None:
     versions = {
         "arm": arm_json.VERSION,
-        "trajectory": plan.FILE.versions[-1],
-        "sequence": sequence_plan.FILE.versions[-1],
+        "trajectory": plan_file.OF_JOB.versions[-1],
+        "sequence": plan_file.OF_SEQUENCE.versions[-1],
         "run": run_folder.VERSION,
         "claim": claim_file.VERSION,
         "arm record": armrecord.VERSION,
@@ -313,7 +313,7 @@ def test_versions_are_those_of_files_that_exist() -> None:
         "run": 2,
         "claim": 1,
         "arm record": 2,
-        "protocol": 7,
+        "protocol": 8,
     }
 
 

@@ -53,7 +53,14 @@ def replay_of(
     )
 
 
-@pytest.fixture(params=[pytest.param(case, id="-".join(case), marks=together(case[0])) for case in CASES])
+@pytest.fixture(
+    params=[
+        pytest.param(
+            case, id="-".join(case), marks=[together(case[0])] + [pytest.mark.long] * (case[0] == "cubic")
+        )
+        for case in CASES
+    ]
+)
 def replay(request: pytest.FixtureRequest, replay_of: Callable[[str, str], Replay]) -> Replay:
     """Each job that is replayed, with its interpreter."""
     return replay_of(*request.param)

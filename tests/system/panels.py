@@ -46,6 +46,8 @@ WAIT_S = 120.0
 DESKTOP = {"width": 1280, "height": 800}
 SMALL = {"width": 640, "height": 900}
 """Size of a window that is drawn quickly by a processor."""
+HOLD_BUTTON = '[aria-label$=" +"]:not([disabled])'
+"""Of a jog that is possible now."""
 _SELDOM = "{const soon = requestAnimationFrame; requestAnimationFrame = (call) => setTimeout(() => soon(call), 500);}"
 """The scene is drawn by the processor too, which has more to do than to draw it 20 times a second."""
 
@@ -259,11 +261,7 @@ def refusal_of(page: Any, button: Any, act: Callable[[], object] | None = None) 
         act() if act else button.click()
         if not act and page.evaluate("armtempo.number") == before:  # grey since Playwright had looked
             continue
-        try:
-            answered = "before => armtempo.answered && armtempo.answered[0] > before"
-            page.wait_for_function(answered, arg=before, timeout=10_000)
-        except Exception:  # a time-out: the server had turned it grey already, and takes no event of it
-            continue
+        page.wait_for_function("before => armtempo.answered && armtempo.answered[0] > before", arg=before)
         refusal = str(page.evaluate("armtempo.answered[1]"))
         if not refusal.startswith(("Not done", "Wait:")):
             return refusal
@@ -292,20 +290,20 @@ def home(page: Any) -> None:
     """Say that the arm is at home, on the tab where it is moved, and wait until it is known there."""
     page.get_by_role("tab", name="Move").click()
     before = page.inner_text("#armtempo-said")
-    page.locator(".armtempo-panels").get_by_role("button", name="Home…").click()
+    press(page, page.locator(".armtempo-panels").get_by_role("button", name="Home…"))
     answer(page, "The arm is at home")
     page.wait_for_function(
         "before => ![before, ''].includes(document.getElementById('armtempo-said').textContent)", arg=before
     )
     wait_for(page, "The arm is at home: done", place="armtempo-said")
-    page.wait_for_selector('[aria-label$=" +"]:not([disabled])')
+    page.wait_for_selector(HOLD_BUTTON)
 
 
 def hold(page: Any, by_key: bool = False) -> None:
     """Hold a jog button until the arm moves; again if a busy browser was silent for too long, as then it lets go."""
     button = page.locator('[aria-label$=" +"]').first
     for _ in range(20):
-        button.click(trial=True)  # once it is enabled: Enter would press what has the focus else
+        page.wait_for_selector(HOLD_BUTTON)  # once it is enabled: Enter would press what has the focus else
         (button.focus if by_key else button.hover)()
         before = page.inner_text("#armtempo-where")
         page.keyboard.down("Enter") if by_key else page.mouse.down()

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline, PPoly
 
 from tests import interpreters
+from tests.plans import changed
 
 JOBS: dict[str, dict[str, Any]] = {
     "shipped": {},
@@ -65,7 +66,7 @@ def refined(plan: Plan) -> Plan:
     joints = [replace(joint, refine=REFINE, time_points_s=points) for joint in plan.trajectory.joints]
     excess = max(_excess(joint, driven) for joint, driven in zip(joints, plan.arm.driven, strict=True))
     slowed = tuple(replace(joint, time_points_s=points * excess) for joint in joints)
-    return replace(plan, trajectory=replace(plan.trajectory, joints=slowed))
+    return changed(plan, trajectory=replace(plan.trajectory, joints=slowed))
 
 
 def _excess(joint: JointSpline, driven: DrivenJoint) -> float:

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import armtempo
 import numpy as np
-from armtempo.encoding import encode, encoded_motion, encoded_sequence
-from armtempo.encoding.encoded_motion import EncodedMotion
+from armtempo.encoding import encode, encoded_plan
+from armtempo.encoding.encoded_plan import EncodedLeg
 from armtempo.model import shipped
 from armtempo.model.arm import Arm, Joint
 from armtempo.model.job import Job
 from armtempo.model.parts import Limits
+from armtempo.model.plan import Plan
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.planning import planner
 from armtempo.simulator import InjectedFault, edgelog
 from armtempo_shared.limits import TICK_HZ
@@ -74,7 +74,7 @@ def small(
     name: str = "small",
     arm: Arm = ARM,
     size: float = 1.0,
-) -> SequencePlan:
+) -> Plan:
     """A pick and place over fractions of a degree, or ``size`` times as far."""
     path = folder / f"{name}.toml"
     value = f'"{times}"' if isinstance(times, str) else times
@@ -91,11 +91,11 @@ def part_lies_there() -> InjectedFault:
     return InjectedFault("input", 0.01, 1, name=PART, level=0)
 
 
-def pauses_s(power: edgelog.PowerCycle, plan: SequencePlan) -> list[float]:
+def pauses_s(power: edgelog.PowerCycle, plan: Plan) -> list[float]:
     """From the planned end of each cycle's last motion to time 0 of the next one's first, seconds."""
     legs = len(plan.legs)
     return [
-        (power.starts[n] - power.starts[n - 1]) / TICK_HZ - plan.legs[-1].duration_s
+        (power.starts[n] - power.starts[n - 1]) / TICK_HZ - plan.legs[-1].trajectory.duration_s
         for n in range(legs, len(power.starts), legs)
     ]
 
@@ -130,7 +130,6 @@ Angles = tuple[float, float, float]
 AWAY: tuple[tuple[Angles, Angles], ...] = (
     ((1.7, -1.43, 2.5), (0.45, -0.45, -0.45)),
     ((-1.5, 2.31, 1.8), (-0.45, 0.45, -0.45)),
-    ((0.2, 4.1, -5.3), (0.45, 0.45, 0.45)),
 )
 """Postures: how far from home, and then from a whole step. The first steps of a motion that begins close to the middle
 between two steps come close together, which is a case of its own to the step generator."""
@@ -140,7 +139,7 @@ _GAP_TICKS = 20_000
 """Steps in opposite directions that are closer are both left out; no motion here comes near it."""
 
 
-def make_flash(flash: Path, away: tuple[tuple[Angles, Angles], ...] = AWAY) -> None:
+def make_flash(flash: Path) -> None:
     """``flash``: is made, with the arm's record, the motions, and ``motions``, the list that the script reads.
 
     The motions are those of the shipped pick and place, and those from each of some postures close to home to each
@@ -150,18 +149,18 @@ def make_flash(flash: Path, away: tuple[tuple[Angles, Angles], ...] = AWAY) -> N
     folder.mkdir(parents=True)
     (folder / "arm.ata").write_bytes(encode.arm_record(ARM))
     plan = armtempo.plan_sequence(ARM, Sequence.load(FOLDER / "sequence.toml", ARM))
-    motions = [*encoded_sequence.of_plan(plan).motions]
+    motions = [*encoded_plan.of_plan(plan).legs]
     quick = replace(ARM, joints=tuple(_quick(joint) for joint in ARM.joints))
     assert encode.arm_record(quick) == encode.arm_record(ARM)
     per_deg = np.array([joint.steps_per_deg for joint in ARM.driven])
     postures = [np.array(ARM.home_deg)]
-    for away_deg, fractions in away:
+    for away_deg, fractions in AWAY:
         postures.append((np.rint((postures[0] + away_deg) * per_deg) + fractions) / per_deg)
     for number, ends in enumerate(itertools.permutations(postures, 2)):
         via = (ends[0], np.mean(ends, axis=0) + MIDDLE_DEG, ends[1])
         points = tuple(tuple(map(float, point)) for point in via)
         job = Job(f"leg{number}", points, population=5, iterations=20, refine=1, path="through")
-        motions.append(encoded_motion.of_trajectory(planner.plan(quick, job).trajectory, quick))
+        motions += encoded_plan.of_trajectory(planner.plan(quick, job).trajectory, quick).legs
     places: dict[tuple[float, ...], int] = {tuple(ARM.home_deg): 0}
     rows = []
     for motion in motions:
@@ -197,7 +196,7 @@ def _quick(joint: Joint) -> Joint:
     return replace(joint, limits=Limits(limits.speed_deg_s, 30 * limits.acceleration_deg_s2, jerk))
 
 
-def steps_in_order(encoded: EncodedMotion) -> list[list[int]]:
+def steps_in_order(encoded: EncodedLeg) -> list[list[int]]:
     """Of each joint its steps in order: how many in one direction, how many in the other, ...; below 0: down."""
     motion = Motion(encoded.data)
     return [

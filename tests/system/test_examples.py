@@ -192,7 +192,7 @@ SHORTER = (
     ("PARTS = 2", "PARTS = 1"),
 )
 """What takes time and shows nothing new here."""
-EVERY_DAY = ("feeding.py",)
+EVERY_DAY = ("ros_trajectory.py",)
 ARGUMENTS = {"sweep.py": ["--jobs", "6"], "compare_searches.py": FEW}
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from armtempo.encoding import encode, encoded_motion
-from armtempo.encoding.encoded_motion import EncodedMotion
+from armtempo.encoding import encode, encoded_plan
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.robot.connect import connect
 from armtempo.robot.store import store
-from armtempo.simulator import LaunchOptions, launch, wear
+from armtempo.simulator import LaunchOptions, launch, launcher
 
 from tests import scripted
 from tests.system import commandline
@@ -33,10 +33,10 @@ def test_it_writes_the_blocks_that_micropythons_own_writes(case: scripted.Case, 
     case.run(str(seed))
 
 
-def way(name: str, *by_deg: list[float]) -> EncodedMotion:
+def way(name: str, *by_deg: list[float]) -> Encoded:
     """A short motion between two postures, given by their distances from home."""
     start, end = (HOME_DEG + np.array(away) for away in by_deg)
-    return encoded_motion.of_trajectory(point_to_point.straight(name, start, end, ARM), ARM)
+    return encoded_plan.of_trajectory(point_to_point.straight(name, start, end, ARM), ARM)
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def day(tmp_path: Path) -> Path:
         "near": way("near", far, home).data,
         "feed": feed.data,
         "food": way("feed", home, [0.1, 0.1, 0.1]).data,
-        "way": encoded_motion.way_back(feed),
+        "way": encoded_plan.way_back(feed),
     }
     for number in range(2):
         safety = replace(ARM.safety, link_timeout_ms=ARM.safety.link_timeout_ms + 1 + number)
@@ -97,4 +97,4 @@ def test_status_shows_erasures_and_moves_add_none(tmp_path: Path) -> None:
 def test_a_virtual_board_in_another_terminal_shows_them_too(tmp_path: Path) -> None:
     with launch(LaunchOptions(tmp_path / "flash")) as process, connect(process.port) as board:
         assert board.state().erasures
-    assert not wear.erasures(process.port)
+    assert not launcher.erasures(process.port)

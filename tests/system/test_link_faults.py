@@ -7,22 +7,19 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from armtempo import simulator
 from armtempo.basics.errors import BoardError
-from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding import encode
 from armtempo.link import Opening, open_board, traffic
 from armtempo.link.board_messages import Done, Event, Sample
-from armtempo.link.follow import MotionFollower
 from armtempo.link.session import Session
 from armtempo.link.traffic import FROM_BOARD, TO_BOARD, Chunk
 from armtempo.link.transport import SerialTransport
-from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.report import run_folder, run_reader
 from armtempo.robot import arm_state, running
@@ -49,15 +46,15 @@ def begun(port: str, folder: Path, lines: int) -> subprocess.Popen[str]:
     return process
 
 
-@pytest.mark.parametrize("kind", ["lose", "double", "flip", "cut"])
-def test_run_over_a_bad_cable_is_complete(tmp_path: Path, kind: str) -> None:
+def test_run_over_a_bad_cable_is_complete(tmp_path: Path) -> None:
+    """Bytes are lost, doubled, changed and cut off; each by itself is tried by tests/host/test_link.py."""
     file = small_plan(tmp_path / "small.json")
-    to_board, from_board = Noise(f"to {kind}", 0.002, (kind,)), Noise(f"from {kind}", 0.002, (kind,))
+    to_board, from_board = (Noise(way, 0.004, ("lose", "double", "flip", "cut")) for way in ("to", "from"))
     with launch() as board, Relay(board.port, tmp_path / "port", to_board, from_board) as relay:
         armtempo("home", "--arm", "paper", "--port", relay.port, folder=tmp_path)
         output = armtempo("run", file, "--port", relay.port, folder=tmp_path)
     assert "complete" in output
-    assert to_board.hits + from_board.hits > 0
+    assert to_board.hits + from_board.hits > 3
     samples = run_reader.load(tmp_path / "runs" / "small-001").repetitions[0]
     assert samples.index.tolist() == list(range(len(samples.index)))
     assert samples.state == run_folder.COMPLETE
@@ -79,21 +76,6 @@ def test_cable_pulled_during_a_run_and_put_back(tmp_path: Path) -> None:
     samples = run_reader.load(tmp_path / "runs" / "small-001").repetitions[0]
     assert samples.index.tolist() == list(range(len(samples.index)))
     assert samples.time_s[-1] > 3.0
-
-
-def test_cable_put_into_another_board_during_a_run(tmp_path: Path) -> None:
-    with (
-        launch(LaunchOptions(virtual_time=False, instant_flash=True)) as board,
-        launch(LaunchOptions(seed=1)) as other,
-    ):
-        armtempo("home", "--arm", "paper", "--port", other.port, folder=tmp_path)
-        with Relay(board.port, tmp_path / "port", clean, clean) as relay:
-            process = begun(relay.port, tmp_path, lines=5)
-        with Relay(other.port, tmp_path / "port", clean, clean):
-            out, error = process.communicate(timeout=SLOW_S)
-    assert process.returncode == 1, out + error
-    assert error.count("waiting for it to come back") == 1
-    assert "another board is on" in error
 
 
 def test_interrupt_while_the_cable_is_out(tmp_path: Path) -> None:
@@ -122,40 +104,6 @@ def test_a_board_that_does_not_answer(tmp_path: Path) -> None:
         os.close(theirs)
     done.said("does not answer within 2 s", "check the cable", "reset a board that hangs")
     assert done.exit_code == 1
-
-
-# a host that is busy for a moment: the virtual board does not run away from it
-
-
-AWAY_S = 3.0
-SPEED_DEG_S = 3.0
-FASTEST = interpreters.starter(interpreters.AVAILABLE[min(1, len(interpreters.AVAILABLE) - 1)])
-
-
-@pytest.mark.long
-def test_samples_wait_for_a_host_that_does_not_read() -> None:
-    """In virtual time a motion of a minute would be over long before the host is back."""
-    shipped = Arm.paper()
-    joints = [
-        replace(joint, limits=replace(joint.limits, speed_deg_s=SPEED_DEG_S)) if joint.limits else joint
-        for joint in shipped.joints
-    ]
-    arm = replace(shipped, joints=tuple(joints))
-    motion = point_to_point.straight("slow", arm.home_deg, [180.0, -60.0, 40.0], arm)
-    with (
-        simulator.launch(simulator.LaunchOptions(interpreter=FASTEST)) as process,
-        open_board(process.port) as board,
-    ):
-        arm_state.configure(board, arm, replace=True)
-        arm_state.home(board, arm)
-        stored = store(board, [("slow", encoded_motion.of_trajectory(motion, arm).data)])
-        assert motion.duration_s > 50.0
-        follower = MotionFollower(board, board.start(stored.name, stored.crc))
-        time.sleep(AWAY_S)
-        indices = [sample.index for sample in follower.samples()]
-    assert follower.ended
-    assert follower.end.lost == ()
-    assert indices == list(range(len(indices)))
 
 
 # A whole recorded session, replayed both ways: the host's bytes to a board, the board's bytes to the host
@@ -279,10 +227,10 @@ def say_again(chunks: list[Chunk], port: str) -> bytes:
         transport.close()
 
 
-@pytest.mark.parametrize("name", INTERPRETERS)
 @TRAFFIC
-def test_a_board_answers_the_host_s_bytes_in_the_same_way(recording: Recording, name: str) -> None:
-    with launch(LaunchOptions(interpreter=interpreters.starter(name))) as process:
+def test_a_board_answers_the_host_s_bytes_in_the_same_way(recording: Recording) -> None:
+    """On another interpreter than the recorded one, where there are two."""
+    with launch(LaunchOptions(interpreter=interpreters.starter(INTERPRETERS[0]))) as process:
         answers = say_again(recording.chunks(), process.port)
     recorded, again = (list(frames(data)) for data in (recording.data(FROM_BOARD), answers))
     pairs = zip(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import LinkError
-from armtempo.encoding import encode, encoded_motion
+from armtempo.encoding import encode, encoded_plan
 from armtempo.link import Client, open_board
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
@@ -32,7 +32,7 @@ def flash(tmp_path: Path) -> Path:
     folder.mkdir(parents=True)
     (folder / "arm.ata").write_bytes(encode.arm_record(commandline.ARM))
     (folder / "go.atm").write_bytes(
-        encoded_motion.of_trajectory(
+        encoded_plan.of_trajectory(
             point_to_point.straight("go", HOME_DEG, AWAY_DEG, commandline.ARM), commandline.ARM
         ).data
     )

@@ -120,21 +120,6 @@ def test_a_trajectory_of_ros_runs_on_its_own_times(tmp_path: Path) -> None:
     assert np.abs(run.commanded_deg - wanted).max() < 0.2
 
 
-def test_fault_is_named_in_terminal_run_folder_and_report(tmp_path: Path) -> None:
-    """A joint far too heavy for its motor: it loses steps, and the encoder's watch ends the run."""
-    heavy = shipped.arm_path().read_text().replace("\ninertia_kg_m2 = 0.15", "\ninertia_kg_m2 = 6.0")
-    (tmp_path / "heavy.toml").write_text(heavy)
-    job = 'name = "throw"\nvia_deg = [[0.0, -60.0, 40.0], [30.0, -60.0, 40.0]]\npath = "through"\niterations = 20\n'
-    (tmp_path / "job.toml").write_text(job)
-    armtempo("plan", "--arm", "heavy.toml", "--job", "job.toml", "-o", "throw.json", folder=tmp_path)
-    output = armtempo("run", "throw.json", folder=tmp_path, code=1)
-    assert "samples-01.csv: fault (following)" in output
-    assert "joint 1" in output
-    assert run_reader.load(tmp_path / "runs" / "throw-001").repetitions[0].state == "fault"
-    armtempo("report", "runs/throw-001", folder=tmp_path)
-    assert "cut short, ended as fault (following)" in (tmp_path / "runs/throw-001/report.html").read_text()
-
-
 # a run that the board's button started while no host was there, and its samples afterwards
 
 

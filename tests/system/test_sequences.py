@@ -61,7 +61,7 @@ def test_cycles_lead_back_to_the_step(name: str, tmp_path: Path) -> None:
     grips = [pulses.tick for pulses in power.pulses[GRIPPER] if pulses.high_ticks == closed]
     for cycle, grip in enumerate(grips):  # between the end of the first motion and the start of the next
         begun = power.starts[LEGS * cycle]
-        assert begun + plan.legs[0].duration_s * TICK_HZ < grip < power.starts[LEGS * cycle + 1]
+        assert begun + plan.legs[0].trajectory.duration_s * TICK_HZ < grip < power.starts[LEGS * cycle + 1]
     assert len(sequences.pauses_s(power, plan)) == CYCLES - 1
 
 
@@ -142,6 +142,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 # ``armtempo demo --pick-and-place``: the shipped sequence, with the part sensor imitated
 
 
+@pytest.mark.long
 def test_two_parts_are_placed(tmp_path: Path) -> None:
     environment = {"ARMTEMPO_MICROPYTHON": interpreters.starter("cpython")}
     done = commandline.run("demo", "--pick-and-place", folder=tmp_path, **environment)

@@ -136,7 +136,9 @@ def moving(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
             owner.communicate()
 
 
-@pytest.mark.parametrize("now", [(), ("--now",)], ids=["brake", "freeze"])
+@pytest.mark.parametrize(
+    "now", [(), pytest.param(("--now",), marks=pytest.mark.long)], ids=["brake", "freeze"]
+)
 def test_a_stop_gets_in_and_the_run_says_who_asked(now: tuple[str, ...], tmp_path: Path) -> None:
     with moving(tmp_path) as (owner, port):
         looked = commandline.run("status", "--port", port, folder=tmp_path)

@@ -23,6 +23,7 @@ from armtempo.simulator.launcher import PREFIX, TemporaryFolder
 from tests import interpreters, scripted
 from tests.system import commandline
 from tests.system.commandline import wait_for
+from tests.system.conftest import FASTEST
 
 CASES = Path(__file__).parent / "scripts" / "cases"
 
@@ -167,7 +168,7 @@ def test_case(case: scripted.Case, tmp_path: Path) -> None:
     case.run(str(tmp_path), heap="")
 
 
-@pytest.fixture(params=[name for name in interpreters.AVAILABLE if name != "cpython"])
+@pytest.fixture(params=interpreters.EACH[1:])
 def bare(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[VirtualBoard]:
     """A board with an empty flash, under real MicroPython."""
     flash = tmp_path / "flash"
@@ -283,7 +284,7 @@ def ask(board: VirtualBoard, code: str, soft_reset: bool = False) -> str:
 
 
 def starter() -> str:
-    return interpreters.starter(interpreters.AVAILABLE[-1])
+    return interpreters.starter(FASTEST)
 
 
 def changes(log: Path, pin: str) -> list[int]:

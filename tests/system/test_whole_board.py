@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from armtempo import plan_sequence
 from armtempo.deploy import program_files
-from armtempo.encoding import encode, encoded_motion, encoded_program, encoded_sequence
+from armtempo.encoding import encode, encoded_plan, encoded_program
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.parts import Limits, LimitSwitches
@@ -111,9 +111,7 @@ def flashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         arm = replace(ARM, safety=replace(ARM.safety, on_link_loss=name))
         (folder / name / "armtempo").mkdir(parents=True)
         (folder / name / "armtempo" / "arm.ata").write_bytes(encode.arm_record(arm))
-        (folder / name / "armtempo" / "go.atm").write_bytes(
-            encoded_motion.of_trajectory(trajectory, arm).data
-        )
+        (folder / name / "armtempo" / "go.atm").write_bytes(encoded_plan.of_trajectory(trajectory, arm).data)
         (folder / "pick.py").write_text(PICK)
         program = encoded_program.of_program(UserProgram.load(folder / "pick.py", arm), arm)
         (folder / name / "armtempo" / "pick.atm").write_bytes(program.data)
@@ -178,7 +176,7 @@ def _add_pallet(folder: Path) -> None:
     plan = plan_sequence(arm, Sequence.load(folder / "lines.toml", arm))
     records = (
         *encoded_program.of_program(program, arm).records,
-        *encoded_sequence.of_plan(plan).records,
+        *encoded_plan.of_plan(plan).records,
     )
     for name, data in records:
         (store / f"{name}.atm").write_bytes(data)
@@ -203,7 +201,7 @@ def _add_legs(folder: Path) -> None:
             iterations=20,
             path="through",
         )
-        record = encoded_motion.of_trajectory(planner.plan(arm, job).trajectory, arm)
+        record = encoded_plan.of_trajectory(planner.plan(arm, job).trajectory, arm)
         (folder / f"leg{number}.atm").write_bytes(record.data)
 
 
@@ -245,6 +243,7 @@ def test_case_with_the_core(case: scripted.Case, flashes: Path, core: str, tmp_p
 
 
 @pytest.mark.long
-def test_every_motion_of_a_soak_makes_the_steps_of_its_record(tmp_path: Path) -> None:
-    sequences.make_flash(tmp_path / "flash", sequences.AWAY[:2])
-    print(sequences.soak(QUICKEST, tmp_path / "flash", 10, seed=20268))
+@pytest.mark.seeds(20268)
+def test_every_motion_of_a_soak_makes_the_steps_of_its_record(seed: int, tmp_path: Path) -> None:
+    sequences.make_flash(tmp_path / "flash")
+    print(sequences.soak(QUICKEST, tmp_path / "flash", 10, seed))

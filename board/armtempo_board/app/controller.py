@@ -22,6 +22,7 @@ from armtempo_shared.messages import (
     SEQUENCE,
     START_HELD,
     START_HOMING,
+    START_SEEKS,
     START_SWITCHES_BIT,
 )
 from micropython import const
@@ -266,8 +267,8 @@ class Controller:
             homing = 0
             if flags & START_HOMING:
                 moving = self._assume(motion)
-                homing = flags >> START_SWITCHES_BIT or moving
-            board.engine.load(motion, rate, None, homing)
+                homing = flags % START_SEEKS >> START_SWITCHES_BIT or moving
+            board.engine.load(motion, rate, None, homing, flags & START_SEEKS != 0)
         except Refused:
             self._withdraw_assumed()
             heap.collect_often()

@@ -4,33 +4,16 @@ The law is that of ``armtempo_shared.homing``. Each group of joints is declared 
 The motions assume that a joint is at their start; it is unknown again at their end, until it is declared.
 """
 
-from armtempo_shared.homing import (
-    AWAY,
-    ELSEWHERE,
-    HELD,
-    MISSED,
-    PRESSED,
-    SIDE,
-    TRIP,
-    Homing,
-)
+from armtempo_shared.homing import AWAY, ON_THE_WAY, SIDE, TRIP, Homing
 from armtempo_shared.messages import NO_JOINT
 
 from armtempo_board.app.cell import CellError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
     from typing import Any
 
     Steps = dict[int, Any]
-
-_WORDS = {
-    MISSED: "no switch of joint %s tripped on the way through its range; check its wiring, pin and level",
-    HELD: "a switch of another joint stops joint %s",
-    ELSEWHERE: "the switch of joint %s tripped elsewhere than before; check its wiring and that it sits firmly",
-    PRESSED: "the switch of joint %s stays pressed; its level is probably inverted, or it is stuck",
-}
 
 
 def home(program: "Any", plan: "dict[str, Any]") -> None:
@@ -43,7 +26,7 @@ class _Group(Homing):
     """Joints that are homed together; lengths are in steps."""
 
     def __init__(self, program: "Any", plan: "dict[str, Any]", group: "list[list[int]]") -> None:
-        super().__init__(group)
+        super().__init__(group, plan["names"], program.table["per_deg"])
         self._program = program
         self._limits = plan["fast"], plan["slow"]
 
@@ -58,9 +41,9 @@ class _Group(Homing):
         self._program.declare(mask, steps)
         self._go_home()
 
-    def failure(self, kind: int, joints: "Sequence[int]", length: "Any") -> CellError:
+    def error(self, problem: str, hint: str) -> CellError:
         """For the program."""
-        return CellError("home: " + _WORDS[kind] % _numbers(joints))
+        return CellError("home: %s; %s" % (problem, hint))
 
     def stands(self, joint: int) -> int:
         """In steps."""
@@ -72,9 +55,9 @@ class _Group(Homing):
         ends = {joint: home[joint] for joint in self.rows}
         tripped = self.move({joint: steps[joint] for joint in ends}, ends, False)
         if tripped != NO_JOINT:
-            raise CellError("home: the switch of joint %d tripped on the way home" % (tripped + 1))
+            raise self.failure(ON_THE_WAY, [tripped])
 
-    def move(self, starts: "Steps", ends: "Steps", is_slow: bool) -> int:
+    def move(self, starts: "Steps", ends: "Steps", is_slow: bool, seeks: bool = False) -> int:
         """See ``Homing``; NO_JOINT if no switch ended it."""
         start = self._program.steps()
         for joint in range(len(start)):  # also where others are, which may be unknown
@@ -83,8 +66,4 @@ class _Group(Homing):
         target = list(start)
         for joint, steps in ends.items():
             target[joint] = steps
-        return self._program.move_homing(start, target, self._limits[is_slow])  # type: ignore[no-any-return]
-
-
-def _numbers(joints: "Iterable[int]") -> str:
-    return ", ".join([str(joint + 1) for joint in sorted(joints)])
+        return self._program.move_homing(start, target, self._limits[is_slow], seeks)  # type: ignore[no-any-return]

@@ -2,15 +2,15 @@
 
 The interrupts' callback (``isr.freezer``) only stops the outputs and releases the drivers. The main loop
 determines the switch and the fault when it finds the outputs frozen. Switches on other pins have no
-interrupt: ``poll_home`` reads them during a homing motion. Time from the edge to frozen outputs:
-docs/hardware.md. The pull resistors pull to the tripped level, so a normally closed switch also trips when
-its wire breaks.
+interrupt: ``poll_home`` reads them during a homing motion, and those that the joints do not move to. Time
+from the edge to frozen outputs: docs/hardware.md. The pull resistors pull to the tripped level, so a
+normally closed switch also trips when its wire breaks.
 """
 
 import micropython
 import stm
 from armtempo_shared import armrecord, codes
-from armtempo_shared.messages import NO_JOINT
+from armtempo_shared.messages import NO_JOINT, OTHER_SWITCH
 from machine import disable_irq, enable_irq
 from pyb import ExtInt, Pin
 
@@ -37,6 +37,8 @@ class Inputs:
         self._limits: "list[tuple[Pin, int, int]]" = []  # pin, level when tripped, line
         self._towards: "list[tuple[int, int, int, int]]" = []  # line, bit of DIR, its level, joint
         self._polled: "list[tuple[Pin, int, int, int, int]]" = []  # pin, level when tripped, and as above
+        self._others: "list[tuple[Pin, int, int, int, int]]" = []  # as above, in a homing motion
+        self._seen = NO_JOINT  # joint of the one of them that was tripped in the last poll
         self._freeze = self._make_freezer()
         if flags & armrecord.FLAG_ESTOP_FITTED:
             self._estop_level = 1 if flags & armrecord.FLAG_ESTOP_ACTIVE_HIGH else 0
@@ -135,14 +137,39 @@ class Inputs:
             if pin.value() == level:
                 self._trip(line)
 
+    def watch_others(self, moving: int) -> None:
+        """Let ``poll_home`` look also at switches that are not tripped now and that the ``moving`` joints (bits; 0: no
+        switches) do not move to."""
+        self._seen = NO_JOINT
+        self._others = []
+        if not moving:
+            return
+        lines = {line: (pin, active) for pin, active, line in self._limits}
+        switches = list(self._polled)
+        for line, bit, level, joint in self._towards:
+            pin, active = lines[line]
+            switches.append((pin, active, bit, level, joint))
+        own = [pin.name() for pin, _, _, _, joint in switches if moving >> joint & 1]
+        for pin, active, bit, level, joint in switches:
+            if pin.value() != active and (moving >> joint & 1 or pin.name() not in own):
+                self._others.append((pin, active, bit, level, joint))
+
     def poll_home(self, moving: int) -> None:
         """Freeze if a switch without an interrupt is tripped and one of the ``moving`` joints (bits) moves
-        towards it."""
+        towards it, or if one of ``watch_others`` is in two calls, and none does."""
         levels = isr.output_levels(self._port)
         for pin, active, bit, level, joint in self._polled:
             if moving >> joint & 1 and (levels & bit != 0) == level and pin.value() == active:
                 isr.set_fault(self._block, codes.LIMIT_SWITCH, joint)
                 self.freeze()
+        seen = NO_JOINT
+        for pin, active, bit, level, joint in self._others:
+            if pin.value() == active and not (moving >> joint & 1 and (levels & bit != 0) == level):
+                if joint == self._seen:
+                    isr.set_fault(self._block, codes.LIMIT_SWITCH, joint | OTHER_SWITCH)
+                    self.freeze()
+                seen = joint
+        self._seen = seen
 
     def note_trip(self) -> bool:
         """Note the fault of a switch that tripped since the last call, the E-stop first; returns whether it

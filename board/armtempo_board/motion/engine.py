@@ -139,12 +139,19 @@ class Engine:
 
     # before a motion
 
-    def load(self, motion: "MotionHead", rate: int = _PERMILLE, ready: "Any" = None, homing: int = 0) -> None:
+    def load(
+        self,
+        motion: "MotionHead",
+        rate: int = _PERMILLE,
+        ready: "Any" = None,
+        homing: int = 0,
+        seeks: bool = False,
+    ) -> None:
         """Check a motion and fill the rings; raises Refused.
 
         ``rate``: of the motion's own time, in thousandths. ``ready``: the ``NextMotion`` that has loaded it.
         ``homing``: one bit per joint whose switches end a homing motion, without a fault; those of others
-        are not watched. ``fault_joint`` then has the joint.
+        are not watched, but if it ``seeks``. ``fault_joint`` then has the joint.
         """
         if self.moving:
             raise Refused(codes.BUSY)
@@ -172,6 +179,8 @@ class Engine:
         self._homing = homing
         self.fault_joint = NO_JOINT
         self.inputs.watch(homing or _ALL_JOINTS)
+        if homing:
+            self.inputs.watch_others(homing if seeks else 0)
 
     def _lead_ticks(self) -> int:
         if not self.inputs.enabled():

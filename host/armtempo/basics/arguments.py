@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache, wraps
 from itertools import chain, repeat
 from operator import call
-from types import UnionType
+from types import SimpleNamespace, UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -91,13 +91,16 @@ def _annotated(
 ) -> tuple[list[str], str, dict[str, Any], dict[str, Callable[[object], bool]]]:
     """Names of the positional arguments, name of the variable one ("" if none), and types and checks of all.
 
-    Arrays have the type ``Numbers``.
+    Arrays have the type ``Numbers``; what takes a ``Where`` or an ``AnyProgram`` checks it itself.
     """
-    arrays: dict[str, Any] = {"ArrayLike": Numbers, "Array": Numbers, "Where": Any}
+    arrays: dict[str, Any] = {"ArrayLike": Numbers, "Array": Numbers, "Where": Any, "AnyProgram": Any}
     code = function.__code__
     rest = code.co_varnames[code.co_argcount + code.co_kwonlyargcount] if code.co_flags & _TAKES_MORE else ""
     kinds = dict.fromkeys((*code.co_varnames[: code.co_argcount], rest), Any)
-    kinds |= get_type_hints(function, localns=arrays)
+    given = {name: kind for name, kind in function.__annotations__.items() if name != "return"}
+    kinds |= get_type_hints(
+        SimpleNamespace(__annotations__=given), inspect.unwrap(function).__globals__, arrays
+    )
     checks = {argument: _check(kind) for argument, kind in kinds.items()}
     return [*code.co_varnames[: code.co_argcount]], rest, kinds, checks
 

@@ -87,4 +87,4 @@ def _pick_and_place() -> None:
         armtempo.connect(process.port, arm) as board,
     ):
         board.home(arm)
-        sequences.run_and_report(board, plan, False, None)
+        sequences.run_and_report(board, plan, None)

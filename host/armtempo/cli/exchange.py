@@ -189,7 +189,7 @@ def export(
     """
     if as_json and output is None:
         raise InputError("--json needs -o FILE", "give -o FILE, or leave out --json")
-    plan = Plan.load(trajectory, altered)
+    plan = Plan.load_motion(trajectory, altered)
     text = plan.to_csv(rate) if kind == "csv" else plan.to_ros(rate, frame_id)
     if output is None:
         click.echo(text.encode(), nl=False)  # UTF-8 as in a file, whatever the terminal

@@ -19,12 +19,12 @@ from armtempo.cli.typed_pose import TypedPose
 from armtempo.model import via_table
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME as HOME
 from armtempo.model.posture import is_via as is_via
 from armtempo.model.posture import name_problem
-from armtempo.model.sequence_plan import AnyPlan
 from armtempo.model.tool_pose import BASE, Pose
-from armtempo.planning import point_to_point, via_points
+from armtempo.planning import point_to_point
 from armtempo.robot.board import Board
 from armtempo.robot.stop_request import Stopped
 
@@ -163,7 +163,7 @@ class NamedPosture:
     text: str
     arm: Arm | None
     """The arm that is set, else the arm of the plan; None: the arm that the board is set up for."""
-    plan: AnyPlan | None
+    plan: Plan | None
     """Of the file."""
 
     @classmethod
@@ -182,6 +182,8 @@ class NamedPosture:
             start_deg = arm.home_deg if self.plan.start_deg is None else self.plan.start_deg
             return point_to_point.posture(start_deg, arm)
         if not name_problem(self.text):
+            from armtempo.planning import via_points  # here, because angles need no inverse kinematics
+
             return via_points.posture_deg(arm, arm.posture(self.text))
         if self.text == HOME:
             return point_to_point.posture(arm.home_deg, arm)

@@ -22,7 +22,6 @@ from armtempo.ports.names import SIM, is_sim
 if TYPE_CHECKING:  # planner and link take long to import, and many commands need neither
     from armtempo.link.traffic import Sink
     from armtempo.model.plan import Plan
-    from armtempo.model.sequence_plan import AnyPlan
     from armtempo.model.thinning import Tolerance
     from armtempo.robot.board import Board
     from armtempo.robot.board_state import BoardState
@@ -168,7 +167,7 @@ _NO_PLANS = {
 """What to do with files of jobs, sequences and programs."""
 
 
-def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> AnyPlan:
+def load_plan(path: Path, arm_path: Path | None, altered: bool = False) -> Plan:
     """The plan of a file, of a motion or a sequence, or one on the times of a recording; InputError if an arm is set
     and does not fit."""
     from armtempo import pipeline

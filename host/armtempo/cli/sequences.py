@@ -20,10 +20,12 @@ from armtempo.cli import resolve, results
 from armtempo.cli.results import ProgressBar
 from armtempo.cli.state import counted
 from armtempo.encoding import flash_use
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link.board_messages import SequenceState
 from armtempo.link.follow import where
+from armtempo.model.leg import SequenceRow
+from armtempo.model.plan import PAUSE_S, Plan, Share
 from armtempo.model.sequence import Sequence, arm_named
-from armtempo.model.sequence_plan import PAUSE_S, SequencePlan, SequenceRow, Share
 from armtempo.model.steps import position, whole_cycles
 from armtempo.report import text_summary
 from armtempo.robot.board import Board
@@ -54,7 +56,7 @@ def refuse_job_options(options: dict[str, Any]) -> None:
         )
 
 
-def values(planned: SequencePlan) -> dict[str, Any]:
+def values(planned: Plan) -> dict[str, Any]:
     """The content of ``lines`` as plain values."""
     cycles = [
         {"step": cycle.step, "times": cycle.times or None, **_share(cycle.share)} for cycle in planned.cycles
@@ -78,14 +80,14 @@ def _share(share: Share) -> dict[str, Any]:
     return {"duration_s": share.total_s, **asdict(share)}
 
 
-def _duration_s(planned: SequencePlan, row: SequenceRow) -> float | None:
+def _duration_s(planned: Plan, row: SequenceRow) -> float | None:
     """Duration of a row; None for a row without one."""
     if row.op == MOVE:
-        return float(planned.legs[row.number].duration_s)
+        return float(planned.legs[row.number].trajectory.duration_s)
     return row.amount / 1000 if row.op == WAIT else None
 
 
-def lines(planned: SequencePlan) -> list[str]:
+def lines(planned: Plan) -> list[str]:
     """Each row with its time, then the times of the cycles and of the whole sequence."""
     rows, depth = [("step", "", "seconds")], 0
     for row in planned.rows:
@@ -151,7 +153,7 @@ class StateLine:
 
 
 def run_and_report(
-    board: Board, sequence: SequencePlan | str, replace: bool, out: Path | None, as_json: bool = False
+    board: Board, sequence: Plan | Encoded | str, out: Path | None, as_json: bool = False
 ) -> SequenceState:
     """Run a sequence, recorded in a run folder in ``out`` (None: not recorded); print its progress and its
     end.
@@ -167,7 +169,7 @@ def run_and_report(
 
     shown = StateLine(describe, say)
     try:
-        end = board.run_sequence(sequence, shown, replace=replace, out=out)
+        end = board.run_sequence(sequence, shown, out=out)
     except Stopped:
         shown.clear()
         say(f"stopped {where(board.client.sequence())}{counted(board.counters)}")

@@ -15,7 +15,6 @@ from armtempo.cli import options, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.link.program_version import UPDATE, own_crc
 from armtempo.model.arm import Arm
-from armtempo.model.steps import position, whole_cycles
 from armtempo.robot.board_state import BoardState, JointState, SequenceStand, ToolPlace
 
 _WIDTH, _INDENT = 80, 10
@@ -98,6 +97,8 @@ def _sequence(stand: SequenceStand) -> str:
     """Name, place and counters of a sequence or program."""
     if stand.name.endswith(SUFFIX):
         return f"program   {stand.name}: {stand.ending}, line {stand.step}{counted(stand.counters)}"
+    from armtempo.model.steps import position, whole_cycles  # here, because a state seldom has a sequence
+
     is_whole = stand.ending == ENDINGS[FINISHED]
     where = whole_cycles(stand.cycle) if is_whole else position(stand.step, stand.cycle)
     return f"sequence  {stand.name}: {stand.ending}, {where}{counted(stand.counters)}"

@@ -14,8 +14,8 @@ from armtempo.basics.text import aligned
 from armtempo.cli import options, posture, programs, resolve, results
 from armtempo.cli.options import BoardOptions
 from armtempo.cli.results import ProgressBar
-from armtempo.encoding import encoded_sequence
-from armtempo.encoding.encoded_motion import EncodedMotion
+from armtempo.encoding import encoded_plan
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.robot.board import Board
@@ -40,7 +40,7 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
         programs.upload_and_report(file, as_default, force, given)
         return
     plan = resolve.load_plan(file, given.arm_path, given.altered)
-    encoded = encoded_sequence.encoded(plan, name)
+    encoded = encoded_plan.of_plan(plan, name)
     with resolve.board(given, encoded.arm) as board:
         board.configure(encoded.arm, replace=given.replace_arm)
         with ProgressBar("uploading") as progress:
@@ -48,7 +48,7 @@ def upload(file: Path, name: str | None, as_default: bool, force: bool, given: B
         virtual = board.info.virtual
     size, stored = {"size_bytes": len(encoded.data)}, f"{len(encoded.data)} bytes stored"
     if encoded.is_sequence:
-        number = len(encoded.motions)
+        number = len(encoded.legs)
         size, stored = {"motions": number}, f"sequence and {number} motions stored"
     where = " on a virtual board" if virtual else ""
     values = {"name": encoded.name, "sequence": encoded.is_sequence, **size, "virtual": virtual}
@@ -150,14 +150,14 @@ def show(name: str, given: BoardOptions) -> None:
     results.show(given.as_json, motion_values(motion, speeds), motion_lines(motion, speeds))
 
 
-def _top_speeds_deg_s(motion: EncodedMotion) -> list[float]:
+def _top_speeds_deg_s(motion: Encoded) -> list[float]:
     """Top speed of each driven joint, from samples."""
     times = np.linspace(0.0, motion.trajectory.duration_s, 2001)
     found: list[float] = np.abs(motion.trajectory(times, 1)).max(axis=0).tolist()
     return found
 
 
-def motion_values(motion: EncodedMotion, speeds: list[float]) -> dict[str, Any]:
+def motion_values(motion: Encoded, speeds: list[float]) -> dict[str, Any]:
     trajectory = motion.trajectory
     return {
         "name": motion.name,
@@ -165,7 +165,7 @@ def motion_values(motion: EncodedMotion, speeds: list[float]) -> dict[str, Any]:
         "duration_s": trajectory.duration_s,
         "degree": trajectory.joints[0].degree,
         "timing": "shared" if trajectory.shared else "per-joint",
-        motion.arm.texts.list_key("start_deg"): [float(angle) for angle in motion.start_deg],
+        motion.arm.texts.list_key("start_deg"): trajectory(0.0).tolist(),
         motion.arm.texts.list_key("end_deg"): trajectory(trajectory.duration_s).tolist(),
         "joints": [
             {
@@ -178,12 +178,12 @@ def motion_values(motion: EncodedMotion, speeds: list[float]) -> dict[str, Any]:
     }
 
 
-def motion_lines(motion: EncodedMotion, speeds: list[float]) -> list[str]:
+def motion_lines(motion: Encoded, speeds: list[float]) -> list[str]:
     trajectory = motion.trajectory
     found = [
         f"{motion.name}: {len(motion.data)} bytes, {trajectory.duration_s:.4f} s, "
         f"degree {trajectory.joints[0].degree}, {'shared' if trajectory.shared else 'per-joint'} timing",
-        f"from {posture.format_angles(motion.start_deg, motion.arm)}",
+        f"from {posture.format_angles(trajectory(0.0), motion.arm)}",
         f"to   {posture.format_angles(trajectory(trajectory.duration_s), motion.arm)}",
     ]
     pairs = zip(motion.arm.driven, trajectory.joints, strict=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from armtempo_shared import motion, sequence
 
 from armtempo.encoding import made_with
-from armtempo.model.sequence_plan import SequencePlan, rows_of
+from armtempo.model.plan import Plan
 from armtempo.splines.trajectory import Trajectory
 
 BLOCK = 512
@@ -28,15 +28,16 @@ def of_names(names: list[str]) -> int:
     return in_blocks(_ENTRY_BYTES * entries)
 
 
-def of_plan(plan: SequencePlan) -> int:
+def of_plan(plan: Plan) -> int:
     """Bytes that a sequence and its motions take."""
-    keys = [(leg.name, 0) for leg in plan.legs]
-    record = made_with.added(sequence.pack(0, rows_of(plan), keys, plan.counters), made_with.of_plan(plan))
-    sizes = [*map(of_trajectory, plan.legs), len(record)]
+    legs = [leg.trajectory for leg in plan.legs]
+    keys, rows = [(leg.name, 0) for leg in legs], [row.numbers for row in plan.rows]
+    record = made_with.added(sequence.pack(0, rows, keys, plan.counters), made_with.of_plan(plan))
+    sizes = [*map(of_trajectory, legs), len(record)]
     return sum(map(in_blocks, sizes)) + of_names([plan.name, *(name for name, _ in keys)])
 
 
-def words(plan: SequencePlan) -> str:
+def words(plan: Plan) -> str:
     """Bytes that a sequence and its motions take, and whether they are more than a new board has."""
     needed = of_plan(plan)
     more = f", more than the {EMPTY_BYTES} of a new board: an upload is refused; plan a part of the pallet"

@@ -23,7 +23,7 @@ from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.descent import descend
 from armtempo.kinematics.forward import forward, frames
 from armtempo.kinematics.geometry import Geometry
-from armtempo.kinematics.inverse import inverse_of_pose
+from armtempo.kinematics.inverse import inverse, inverse_of_pose
 from armtempo.kinematics.numerical import MovingArm, NumericalSolution, NumericalSolutions, search, why_not
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.rejection import out_of_range, table
@@ -130,6 +130,12 @@ class PoseSolver:
         """Why the closed form does not serve this arm; empty if it does."""
         return refusals(self.geometry.holding(self.home_rad))
 
+    @cached_property
+    def _has_closed_form(self) -> bool:
+        """Whether it serves, and a motor turns each of its joints."""
+        turning = [joint for joint in self.moving.moving if joint not in self.ranges.slides]
+        return not self.refusals and len(turning) == 6
+
     def nearest(self, target: Pose, start_rad: Sequence[float]) -> Nearest:
         """The posture that meets ``target`` nearest to ``start_rad``, (joints,): well under a millisecond.
 
@@ -137,8 +143,7 @@ class PoseSolver:
         the nearest of all solutions; others the result of one descent from the start.
         """
         start = self._checked(start_rad)
-        turning = [joint for joint in self.moving.moving if joint not in self.ranges.slides]
-        if target.fixed == WHOLE and not self.refusals and len(turning) == 6:
+        if target.fixed == WHOLE and self._has_closed_form:
             angles = self._nearest_of_eight(target, start)
             if angles is not None:
                 return self._answer(target, start, angles, CLOSED_FORM)
@@ -154,6 +159,37 @@ class PoseSolver:
             return self._answer(target, start, found, NUMERICAL)
         within = descend(self.moving.problem(constraint, within=True), start).angles_rad
         return self._answer(target, start, within, NUMERICAL, "; ".join(outside))
+
+    def nearest_of_many(self, poses: Array, start_rad: Array, most: tuple[float, float]) -> Array:
+        """The postures nearest to a start that meet whole poses, (K, 4, 4), by the closed form: (n, joints), n <= K.
+
+        ``start_rad``: of each pose, (K, joints), or of the first, (joints,); the others then start from the posture
+        before. ``most``: tolerances in mm and degrees. The postures end where one is singular, has a free angle, or
+        is not found: ``nearest`` tells more of that one.
+        """
+        joints = len(self.arm.joints)
+        if not self._has_closed_form:
+            return np.empty((0, joints))
+        starts = np.broadcast_to(start_rad, (len(poses), joints)).tolist()
+        solutions = inverse(self.geometry.holding(starts[0]), poses, start_rad)
+        free = np.any((solutions.outcome == OK) & (solutions.singular != 0), axis=1)
+        rows: list[list[float]] = []
+        for angles, outcome, start in zip(
+            solutions.angles_rad[: np.argmax([*free, True])].tolist(),
+            solutions.outcome.tolist(),
+            starts,
+            strict=False,
+        ):
+            best = self._nearest_usable(angles, outcome, rows[-1] if rows and start_rad.ndim == 1 else start)
+            if best is None:
+                break
+            rows.append(best)
+        found = np.array(rows).reshape(-1, joints)
+        off = forward(self.geometry, found)[:, :3] - poses[: len(found), :3]
+        chord = np.sqrt(np.square(off[:, :, :3]).sum(axis=(1, 2)))
+        missed = np.sqrt(np.square(off[:, :, 3]).sum(axis=1)) > most[0]
+        missed |= chord > 2.0 * math.sqrt(2.0) * math.sin(math.radians(most[1]) / 2.0)
+        return found[: np.argmax([*missed, True])]
 
     def solve(self, target: Pose, previous_rad: Sequence[float], numerically: bool = False) -> Answer:
         """All postures that meet ``target``, the one nearest to ``previous_rad``, (joints,), chosen.
@@ -189,9 +225,14 @@ class PoseSolver:
     def _nearest_of_eight(self, target: Pose, start: list[float]) -> list[float] | None:
         """The nearest solution of the closed form within the ranges; None if there is none."""
         rows = [element for row in target.matrix for element in row]
+        return self._nearest_usable(*inverse_of_pose(self.geometry.holding(start), rows, start)[:2], start)
+
+    def _nearest_usable(
+        self, solutions: Sequence[Sequence[float]], outcomes: Sequence[int], start: list[float]
+    ) -> list[float] | None:
+        """The nearest of eight solutions within the ranges; None if there is none."""
         best, least = None, math.inf
-        geometry = self.geometry.holding(start)
-        for angles, outcome in zip(*inverse_of_pose(geometry, rows, start)[:2], strict=True):
+        for angles, outcome in zip(solutions, outcomes, strict=True):
             if outcome != OK:
                 continue
             placed, outside = self.ranges.fitted(angles, start)

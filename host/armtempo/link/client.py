@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from armtempo_shared import wire
 from armtempo_shared.messages import MAX_COMMAND, MAX_PAYLOAD, PERMILLE, PROGRAM, SEQUENCE, START_HELD
 
-from armtempo.basics.errors import BoardError, InputError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.basics.progress import Progress
 from armtempo.link import board_messages
 from armtempo.link.refusal import refusal
@@ -126,14 +126,9 @@ class Client:
     def put_once(self, data: bytes) -> int:
         """Put the record of a motion that is run once into the board's memory: nothing is stored.
 
-        It is started as ``ONCE_NAME``, with the checksum that this returns, and replaced by the next one. Raises
-        InputError if it is larger than ``info.once_bytes``.
+        It is started as ``ONCE_NAME``, with the checksum that this returns, and replaced by the next one. The board
+        refuses one that is larger than ``info.once_bytes``.
         """
-        if len(data) > self.info.once_bytes:
-            raise InputError(
-                f"the move takes {len(data)} bytes; the board keeps {self.info.once_bytes} of one that is not stored",
-                "make it shorter, or plan it as a job and store it",
-            )
         self._put("put_once", data, (len(data),))
         return wire.record_crc(data)
 

@@ -22,7 +22,6 @@ from armtempo.link.board_messages import (
     SequenceState,
 )
 from armtempo.link.client import Client
-from armtempo.model.steps import position
 
 ACKNOWLEDGE_S = 0.25
 """Interval of acknowledgements; they also show the board that the host is alive."""
@@ -345,4 +344,6 @@ class SequenceFollower(Follower):
 
 def where(state: SequenceState) -> str:
     """Describe step and cycle."""
+    from armtempo.model.steps import position  # here, because moves have no steps
+
     return f"in {position(state.step, state.cycle)}"

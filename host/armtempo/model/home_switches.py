@@ -5,7 +5,7 @@ The host drives homing by them (``robot/homing.py``), or the board alone, for a 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -125,15 +125,9 @@ def problems(arm: HomedArm) -> list[SwitchProblem]:
     return found
 
 
-def sharing(arm: HomedArm, joints: Collection[int]) -> list[str]:
-    """The names of other joints with a switch on an input of these joints (from 0, among the driven ones)."""
-    pins = {pin for index in joints for pin in _pins(arm.driven[index])}
-    others = (joint for index, joint in enumerate(arm.driven) if index not in joints)
-    return [joint.name for joint in others if pins & _pins(joint)]
-
-
-def _pins(joint: DrivenJoint) -> set[int | str]:
-    return {pin for pin in (joint.switches.low, joint.switches.high) if pin is not None}
+def names(arm: HomedArm) -> list[list[str]]:
+    """Name and unit of each driven joint, for what ``armtempo_shared.homing`` says of it."""
+    return [[joint.name, joint.unit.word] for joint in arm.driven]
 
 
 def check(arm: HomedArm, joints: Iterable[int]) -> None:

@@ -1,149 +1,198 @@
-"""A plan: the trajectory with arm, job and search results, and its file.
-
-The trajectory file is JSON, with everything that is needed to run the plan and to plan it again. It has a
-sha256 of the plan, independent of white space; files of version 1 have none.
-"""
+"""A plan: legs from rest to rest, and the rows in which the board makes them; that of a job has one of each."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal
 
 import numpy as np
-from armtempo_shared.basis import BASIS
+from armtempo_shared import sequence as record
+from armtempo_shared.sequence import COUNT, END, MOVE, REPEAT, WAIT
 
-from armtempo.basics import json_codec
 from armtempo.basics.arguments import checked
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.model import arm_json, exchange
+from armtempo.model import arm_json, exchange, plan_file
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, Job
-from armtempo.model.plan_file import PlanFile
+from armtempo.model.leg import JobSolution, PlanLeg, Search, SequenceRow, check_spline, only_row
+from armtempo.model.plan_file import AGAIN, Content, JobContent, SequenceContent
 from armtempo.splines.extremes import Extremes
-from armtempo.splines.trajectory import JointSpline, Trajectory
+from armtempo.splines.trajectory import Trajectory
 
-FILE = PlanFile(
-    "armtempo trajectory",
-    "plan",
-    "a trajectory file",
-    "armtempo plan",
-    "a trajectory file is replaced by one of the same job, by its name, for an arm of the same name",
-    (1, 2),
-)
+PAUSE_S = 0.015
+"""Approximate time from the end of a motion to the start of the next, if the board prepares motions
+(host/docs/sequences.md)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Search:
-    """The search for the time axis of one joint, or for the shared one."""
+@dataclass(frozen=True)
+class Share:
+    """The parts of a duration."""
 
-    joints: tuple[int, ...]
-    """Indices (among the driven joints) of the joints with this axis."""
-    intervals_s: Array
-    """The variables: the intervals X (n,), or with refinement all differences of time control points."""
-    total_s: float
-    """The motion time."""
-    searched_s: float
-    """The motion time of the search alone, without polish or refinement."""
-    evaluations: int
-    """Fitness evaluations of the search."""
-    history_s: Array
-    """Best fitness of the first population and after each iteration, (iterations + 1,); of a gradient search the best
-    motion time after each start."""
-    optimum_s: float
-    """After polish: lower bound of the local optimum with the same number of intervals; else 0."""
-    lower_bound_s: float = field(metadata={json_codec.KEY: "floor_s"})
-    """Proven lower bound of the motion time over all time laws along this path; for a free path, over all
-    paths through the via points."""
-    lower_bound_kind: str = field(metadata={json_codec.KEY: "floor_kind"})
-    """How the lower bound was found, see ``lower_bounds.LowerBound``."""
-    starts_s: Array = field(default_factory=lambda: np.empty(0), metadata=json_codec.ADDED)
-    """For a gradient search, the motion time of each start on few segments; else empty."""
+    motion_s: float = 0.0
+    wait_s: float = 0.0
+    motions: int = 0
+    """Number of motions; before each is a pause."""
+
+    @property
+    def total_s(self) -> float:
+        """The sum."""
+        return self.motion_s + self.wait_s + PAUSE_S * self.motions
+
+    def __add__(self, other: Share) -> Share:
+        return Share(self.motion_s + other.motion_s, self.wait_s + other.wait_s, self.motions + other.motions)
+
+    def __mul__(self, times: int) -> Share:
+        return Share(self.motion_s * times, self.wait_s * times, self.motions * times)
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One pass of a repeat."""
+
+    step: int
+    times: int
+    """0: for ever."""
+    share: Share
 
 
 @checked
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan:
-    """A motion of ``arm`` for ``job`` within all limits.
+    """What ``arm`` does within all limits: the motion of a job, or a sequence.
 
-    ``trajectory(time_s, order)``: angles of the driven joints or their derivatives, (..., J).
+    ``trajectory`` and what is said of one motion is that of the only leg; InputError for a plan that does more.
     """
 
     arm: Arm
-    job: Job
-    via_deg: Array
-    """Angles of the driven joints at the via points, (n + 1, J)."""
-    notes: tuple[str, ...]
-    """Notes for the user about the solution of poses."""
-    trajectory: Trajectory
-    searches: tuple[Search, ...]
-    """One for each joint that moves, or one for the shared time axis."""
-    extremes: tuple[Extremes, ...]
-    """Largest speed, acceleration and jerk of each driven joint, as proven bounds."""
+    name: str
+    legs: tuple[PlanLeg, ...]
+    """Its different motions; of a sequence NAME-1, NAME-2, … on the board."""
+    rows: tuple[SequenceRow, ...]
     versions: Mapping[str, str]
     """Versions on which the numbers depend: armtempo, numpy, scipy, Python, processor."""
-    is_sequence: ClassVar[Literal[False]] = False
+    notes: tuple[str, ...] = ()
+    """For the user: on the solution of poses; of a sequence on the motions that were planned, with their names."""
+    frames: tuple[str, ...] = ()
+    """The frames of the arm in which something of it was given."""
+    pallets: tuple[str, ...] = ()
+    """The pallets of the arm that it uses."""
+    counters: tuple[str, ...] = ()
+    """Names of the counters, by their number in the rows."""
+
+    @classmethod
+    def of_job(
+        cls,
+        arm: Arm,
+        solution: JobSolution,
+        trajectory: Trajectory,
+        notes: tuple[str, ...],
+        versions: Mapping[str, str],
+    ) -> Plan:
+        """The plan of a job's motion."""
+        job = solution.job
+        leg = PlanLeg(trajectory, job.holds, solution=solution)
+        return cls(arm, job.name, (leg,), (only_row(job.name),), versions, notes, job.frames)
 
     def __repr__(self) -> str:
-        return f"<Plan {self.job.name!r} for {self.arm.name!r}: {len(self.via_deg)} via points, {self.total_s:.3f} s>"
+        if self.is_sequence:
+            what = f"{len(self.rows)} rows, {len(self.legs)} motions"
+        else:
+            what = f"{len(self.via_deg)} via points, {self.total_s:.3f} s"
+        return f"<Plan {self.name!r} for {self.arm.name!r}: {what}>"
 
     @property
-    def name(self) -> str:
-        """The job's name."""
-        return self.job.name
-
-    @property
-    def frames(self) -> tuple[str, ...]:
-        """Names of the frames that the job's poses are in."""
-        return self.job.frames
-
-    @property
-    def start_deg(self) -> Array:
-        """Start posture, degrees (J,)."""
-        return self.trajectory(0.0)
-
-    @property
-    def loads(self) -> tuple[str, ...]:
-        """What the tool holds in its motion; "": nothing."""
-        return (self.job.holds,)
-
-    @property
-    def pallets(self) -> tuple[str, ...]:
-        """None: those of the arm that a sequence uses."""
-        return ()
-
-    @property
-    def holding(self) -> Arm:
-        """The arm with what it holds in this motion."""
-        return self.arm.holding(self.job.holds)
+    def is_sequence(self) -> bool:
+        """Whether it is that of a sequence, not of a job: another file, and another record on the board."""
+        return len(self.legs) != 1 or self.legs[0].solution is None
 
     @property
     def loaded_legs(self) -> list[tuple[Arm, Trajectory]]:
-        """Its one leg, with the arm as it is there."""
-        return [(self.holding, self.trajectory)]
+        """Each leg's motion with the arm as it is there, with its tool and load."""
+        return [(self.arm.with_tool(leg.tool).holding(leg.load), leg.trajectory) for leg in self.legs]
+
+    @property
+    def start_deg(self) -> Array | None:
+        """Start posture, degrees (J,); None if nothing moves."""
+        first = next((row.number for row in self.rows if row.op == MOVE), None)
+        return None if first is None else self.legs[first].trajectory(0.0)
+
+    @property
+    def cycles(self) -> tuple[Cycle, ...]:
+        """One pass of each outermost repeat."""
+        return self._times()[1]
+
+    @property
+    def total(self) -> Share | None:
+        """All rows without waits for inputs; None if they have no end."""
+        return self._times()[0]
+
+    def _times(self) -> tuple[Share | None, tuple[Cycle, ...]]:
+        open_: list[tuple[SequenceRow, Share]] = []
+        share, endless = Share(), False
+        cycles = []
+        for row in self.rows:
+            if row.op == MOVE:
+                share += Share(motion_s=self.legs[row.number].trajectory.duration_s, motions=1)
+            elif row.op == WAIT:
+                share += Share(wait_s=row.amount / 1000)
+            elif row.op == REPEAT:
+                open_.append((row, share))
+                share = Share()
+            elif row.op == END:
+                begun, before = open_.pop()
+                if row.value:
+                    times = begun.amount + begun.value if begun.amount else 0
+                    cycles.append(Cycle(begun.step, times, share))
+                endless = endless or not begun.amount
+                share = before + share * begun.amount
+        return (None if endless else share), tuple(cycles)
+
+    # of a plan of one motion
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """``trajectory(time_s, order)``: angles of the driven joints or their derivatives, (..., J)."""
+        if [row.op for row in self.rows] != [MOVE]:
+            raise InputError(
+                f"{self.name!r} is a sequence of {len(self.legs)} motions, not one motion",
+                "plan the job of one of them; in Python, take them from 'legs'",
+            )
+        return self.legs[0].trajectory
 
     @property
     def total_s(self) -> float:
         """The motion time, until the last joint arrives, seconds."""
         return self.trajectory.duration_s
 
-    def save(self, path: Path | str, force: bool = False) -> None:
-        """Write the trajectory file, atomically.
+    @property
+    def solution(self) -> JobSolution:
+        """How the motion of a job was found."""
+        found = self.legs[0].solution if len(self.legs) == 1 else None
+        if found is None:
+            raise InputError(f"{self.name!r} is a sequence, not the motion of a job", "plan the job itself")
+        return found
 
-        Replaces only a file of the same job for the same arm (by name) that was not altered; ``force``: any
-        file. Raises InputError if it may not be replaced, or cannot be written.
-        """
-        FILE.save(path, self, force, self._is_same)
+    @property
+    def job(self) -> Job:
+        """The job, as it was planned."""
+        return self.solution.job
 
-    def check_replaceable(self, path: Path | str, force: bool = False) -> None:
-        """Raise InputError if ``save`` would not replace a file that exists; nothing is written."""
-        FILE.check_replaceable(path, self, force, self._is_same)
+    @property
+    def via_deg(self) -> Array:
+        """Angles of the driven joints at the job's via points, (n + 1, J)."""
+        return self.solution.via_deg
 
-    def _is_same(self, content: Any) -> bool:
-        """Whether the content of a file is a plan of the same job and arm, by their names."""
-        return (content["job"]["name"], content["arm"]["name"]) == (self.name, self.arm.name)
+    @property
+    def searches(self) -> tuple[Search, ...]:
+        """Those of a job: one for each joint that moves, or one for the shared time axis."""
+        return self.solution.searches
+
+    @property
+    def extremes(self) -> tuple[Extremes, ...]:
+        """Largest speed, acceleration and jerk of each driven joint, as proven bounds."""
+        return self.solution.extremes
 
     def to_csv(self, rate_hz: float = 100.0) -> str:
         """Angle, speed, acceleration and jerk of each driven joint as CSV, ``rate_hz`` lines a second."""
@@ -155,73 +204,132 @@ class Plan:
         names, units = [joint.name for joint in driven], [joint.unit for joint in driven]
         return exchange.to_ros(self.trajectory, names, units, rate_hz, frame_id)
 
+    # files
+
+    def save(self, path: Path | str, force: bool = False) -> None:
+        """Write the file, of a job or of a sequence, atomically.
+
+        Replaces only an unaltered file of the same job for the same arm, or of the same sequence (by name);
+        ``force``: any file. Raises InputError if it may not be replaced, or cannot be written.
+        """
+        plan_file.save(path, self._content(), force)
+
+    def check_replaceable(self, path: Path | str, force: bool = False) -> None:
+        """Raise InputError if ``save`` would not replace a file that exists; nothing is written."""
+        plan_file.check(path, self._content(), force)
+
     @classmethod
     def load(cls, path: Path | str, altered: bool = False) -> Plan:
-        """The plan of a trajectory file.
+        """The plan of a file, of a job or of a sequence.
 
         ``altered``: accept a file that was altered after it had been written. Raises InputError for a file
         that is missing, incomplete, altered, of another format or version, or has an unknown key, value or
         shape.
         """
-        plan: Plan = json_codec.decode(cls, FILE.read(path, altered), f"{path}: plan")
-        _check(plan, path)
-        return plan
+        content = plan_file.read(path, altered)
+        arm_json.check(content.arm, f"{path}: arm", AGAIN)
+        if isinstance(content, JobContent):
+            _check_motion(content, path)
+            solution = JobSolution(content.job, content.via_deg, content.searches, content.extremes)
+            return cls.of_job(content.arm, solution, content.trajectory, content.notes, content.versions)
+        _check_rows(content, path)
+        none = ("",) * len(content.legs)
+        each = zip(content.legs, content.loads or none, content.tools or none, strict=True)
+        return cls(
+            content.arm,
+            content.name,
+            tuple(PlanLeg(*leg) for leg in each),
+            content.rows,
+            content.versions,
+            content.notes,
+            content.frames,
+            content.pallets,
+            content.counters,
+        )
+
+    @classmethod
+    def load_motion(cls, path: Path | str, altered: bool = False) -> Plan:
+        """As ``load``; also InputError for a plan of a sequence."""
+        found = cls.load(path, altered)
+        if found.is_sequence:
+            raise InputError(
+                f"{path}: is the plan of a sequence, not of a motion",
+                "give that of a job: 'armtempo plan JOB.toml'",
+            )
+        return found
+
+    def _content(self) -> Content:
+        """What its file has."""
+        if not self.is_sequence:
+            return JobContent(
+                self.arm,
+                self.job,
+                self.via_deg,
+                self.notes,
+                self.trajectory,
+                self.searches,
+                self.extremes,
+                self.versions,
+            )
+        return SequenceContent(
+            self.arm,
+            self.name,
+            tuple(leg.trajectory for leg in self.legs),
+            self.rows,
+            self.counters,
+            self.versions,
+            tuple(leg.load for leg in self.legs),
+            self.notes,
+            self.frames,
+            tuple(leg.tool for leg in self.legs) if any(leg.tool for leg in self.legs) else (),
+            self.pallets,
+        )
 
 
-def _check(plan: Plan, path: Path | str) -> None:
+def _check_motion(found: JobContent, path: Path | str) -> None:
     """Check what types cannot express: shapes, increasing times, one spline for each driven joint."""
-    arm_json.check(plan.arm, f"{path}: arm", "plan it again")
-    joints, driven = plan.trajectory.joints, plan.arm.driven
+    joints, driven = found.trajectory.joints, found.arm.driven
     if not joints or len(joints) != len(driven):
         raise InputError(
-            f"{path}: {len(joints)} joints in the trajectory, the arm drives {len(driven)}",
-            "plan it again",
+            f"{path}: {len(joints)} joints in the trajectory, the arm drives {len(driven)}", AGAIN
         )
-    if plan.via_deg.shape[1:] != (len(driven),) or len(plan.extremes) != len(driven):
+    if found.via_deg.shape[1:] != (len(driven),) or len(found.extremes) != len(driven):
         raise InputError(
-            f"{path}: via_deg and extremes must have an entry for each of {len(driven)} joints",
-            "plan it again",
+            f"{path}: via_deg and extremes must have an entry for each of {len(driven)} joints", AGAIN
         )
     for number, spline in enumerate(joints, 1):
-        _check_spline(spline, len(plan.via_deg) - 1, f"{path}: trajectory joint {number}")
-    if plan.trajectory.shared and any(
+        check_spline(spline, len(found.via_deg), f"{path}: trajectory joint {number}")
+    if found.trajectory.shared and any(
         not np.array_equal(spline.time_points_s, joints[0].time_points_s) for spline in joints
     ):
+        raise InputError(f"{path}: shared timing, but the joints' time control points differ", AGAIN)
+    if isinstance(found.job.refine, str) and found.job.refine != AUTO:
         raise InputError(
-            f"{path}: shared timing, but the joints' time control points differ",
-            "plan it again",
+            f"{path}: plan.job.refine {found.job.refine!r} should be a number or {AUTO!r}", AGAIN
         )
-    if isinstance(plan.job.refine, str) and plan.job.refine != AUTO:
-        raise InputError(
-            f"{path}: plan.job.refine {plan.job.refine!r} should be a number or {AUTO!r}", "plan it again"
-        )
-    if any(not 0 <= index < len(joints) for search in plan.searches for index in search.joints):
-        raise InputError(f"{path}: searches name a joint that does not exist", "plan it again")
+    if any(not 0 <= index < len(joints) for search in found.searches for index in search.joints):
+        raise InputError(f"{path}: searches name a joint that does not exist", AGAIN)
 
 
-def _check_spline(spline: JointSpline, legs: int, where: str) -> None:
-    segments = legs
-    if spline.via_segments is not None:
-        if len(spline.via_segments) != legs + 1 or spline.via_segments[0] != 0:
-            raise InputError(
-                f"{where}: via_segments must name {legs + 1} via points, the first at 0", "plan it again"
-            )
-        if np.any(np.diff(spline.via_segments) < 1):
-            raise InputError(f"{where}: its via_segments do not increase", "plan it again")
-        segments = spline.via_segments[-1]
-    if spline.degree not in BASIS or spline.refine < 1:
+def _check_rows(found: SequenceContent, path: Path | str) -> None:
+    there = {MOVE: len(found.legs), COUNT: len(found.counters)}
+    if any(not 0 <= row.number < there.get(row.op, row.number + 1) for row in found.rows):
+        raise InputError(f"{path}: a row names a motion or counter that does not exist", AGAIN)
+    if any(len(names) not in (0, len(found.legs)) for names in (found.loads, found.tools)):
         raise InputError(
-            f"{where}: degree {spline.degree} with refine {spline.refine} is not known",
-            "plan it again",
+            f"{path}: loads and tools must have an entry for each of {len(found.legs)} motions", AGAIN
         )
-    for what, points, pieces in (
-        ("angle", spline.angle_points_deg, segments),
-        ("time", spline.time_points_s, segments * spline.refine),
-    ):
-        if points.shape != (pieces + spline.degree,):
-            raise InputError(
-                f"{where}: {points.size} {what} control points do not fit {pieces} segments",
-                "plan it again",
-            )
-    if not np.all(np.diff(spline.time_points_s) > 0):
-        raise InputError(f"{where}: its time control points do not increase", "plan it again")
+
+
+def check_size(rows: int, legs: int, counters: int, where: str) -> None:
+    """Raise InputError if the sequence is too large for the board."""
+    if counters > record.MAX_COUNTERS:
+        raise InputError(
+            f"{where}: {counters} counters; the board keeps {record.MAX_COUNTERS} for a sequence",
+            "use fewer counters",
+        )
+    if rows > record.MAX_ROWS or legs > record.MAX_MOTIONS:
+        raise InputError(
+            f"{where}: {rows} rows and {legs} motions; the board takes {record.MAX_ROWS} and {record.MAX_MOTIONS}",
+            "use repeat, or split it into two sequences; of a pallet, plan some of its layers or rows",
+        )

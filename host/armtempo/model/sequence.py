@@ -263,7 +263,7 @@ class _Reader:
     def _motion(self, table: Table, key: str) -> SourceMotion:
         path = self.file.parent / table.text(key)
         if path not in self.motions:
-            source = Plan.load(path) if path.suffix == ".json" else Job.load(path, self.arm)
+            source = Plan.load_motion(path) if path.suffix == ".json" else Job.load(path, self.arm)
             self.motions[path] = SourceMotion(path.stem, source)
         return self.motions[path]
 

@@ -102,6 +102,7 @@ def thinned(
     legs, waits_s = _at_rests(points_deg, times_s, _STILL * tolerance_deg)
     if not legs:
         raise InputError("all points are the same within the tolerance", "give a path that moves")
+    cut_deg = 0.0 if steps is None else _cut(legs, waits_s, tolerance_deg, unit_words, steps)
     low, high = (
         np.full((2, points_deg.shape[1]), np.inf) * [[-1.0], [1.0]] if ranges_deg is None else ranges_deg.T
     )
@@ -132,7 +133,7 @@ def thinned(
     numbers = np.cumsum([len(each) - 1 for each in via]).tolist()
     rests = dict(zip(numbers[:-1], waits_s[1:-1], strict=True))
     points = np.concatenate([via[0], *(each[1:] for each in via[1:])])
-    return Thinned(points, rests, off_deg, (waits_s[0], waits_s[-1]))
+    return Thinned(points, rests, max(off_deg, cut_deg), (waits_s[0], waits_s[-1]))
 
 
 def _check(tolerance: float, unit_words: str) -> None:
@@ -193,6 +194,39 @@ def _at_rests(
         part[0], part[-1] = points[(before + first) // 2], points[(last + after) // 2]
         legs.append((part, times_s[first : last + 1]))
     return legs, [float(times_s[last] - times_s[first]) for first, last in runs]
+
+
+def _cut(
+    legs: list[tuple[Array, Array | None]],
+    waits_s: list[float],
+    tolerance_deg: float,
+    unit_words: str,
+    steps: Callable[[Array], Array],
+) -> float:
+    """Take first and last legs away that end less than a step from where they begin, as the planner cannot keep the
+    rest behind them; returns how far from there they went. Raises InputError if that is more than the tolerance."""
+    most_deg = 0.0
+    for outer in (0, -1):
+        while len(legs) > 1:
+            points, times_s = legs[outer]
+            inner = points[-1 - outer]
+            off_deg = float(np.abs(points - inner).max())
+            off_steps = np.abs(steps(points) - steps(inner[None]))
+            if times_s is None or np.any(off_steps[outer] >= 1.0):
+                break
+            if off_deg > tolerance_deg:
+                if np.any(off_steps >= 1.0):
+                    break
+                raise InputError(
+                    f"its {'last' if outer else 'first'} move, of {off_deg:.2g} {unit_words} at most, is less than a "
+                    "step, and the rest beside it cannot be kept",
+                    "allow that much with --tolerance-deg or --tolerance-mm, or cut it from the table",
+                )
+            legs.pop(outer)
+            rest_s = waits_s.pop(outer) + float(times_s[-1] - times_s[0])
+            waits_s[outer] += rest_s
+            most_deg = max(most_deg, off_deg)
+    return most_deg
 
 
 def _runs(points: Array, times_s: Array, still_deg: float) -> list[tuple[int, int]]:

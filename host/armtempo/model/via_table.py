@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,14 +14,16 @@ from armtempo.basics import number_table
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.number_table import NumberTable
-from armtempo.model import joint_trajectory, ros_bag, table_header, thinning
+from armtempo.model import joint_trajectory, ros_bag, table_header
 from armtempo.model.arm import Arm
 from armtempo.model.joint_trajectory import Recorded
 from armtempo.model.joint_unit import DEG, NEUTRAL
 from armtempo.model.parts import DrivenJoint, Joint
 from armtempo.model.table_header import Column, Header
-from armtempo.model.thinning import JointTolerance, Tolerance
 from armtempo.model.tool_pose import BASE, WHOLE
+
+if TYPE_CHECKING:
+    from armtempo.model.thinning import JointTolerance, Tolerance
 
 TOLERANCE_DEG = 0.1
 """Default tolerance for thinning a sampled motion."""
@@ -32,6 +35,8 @@ _SLOWEST = 0.02
 """A motion in whole seconds that is always below this part of the speed limits may have its times in milliseconds."""
 _ALIKE = 2.0
 """A step of a recording is as its neighbours if it is no faster than this factor."""
+_MOST_BEYOND = 0.499
+"""Part of the tolerance by which points may be outside of a range, less than ``thinning`` allows."""
 _SPEED_MARGIN = 1.05
 """Recordings may be faster than the limit by this factor, as their times scatter."""
 
@@ -160,6 +165,8 @@ def via_points(
 
 
 def _tolerance(arm: Arm, given: Tolerance | None) -> JointTolerance:
+    from armtempo.model.thinning import JointTolerance  # here, as a goto reads no recording
+
     units = [joint.unit for joint in arm.driven]
     return JointTolerance.of(TOLERANCE_DEG if given is None else given, units)
 
@@ -168,8 +175,10 @@ def _thinned(
     angles: Array, times_s: Array | None, arm: Arm, tolerance_deg: Tolerance | None, notes: tuple[str, ...],
     where: Sequence[str],
 ) -> ImportedPath:  # fmt: skip
+    from armtempo.model import thinning
+
     tolerance = _tolerance(arm, tolerance_deg)
-    _check_ranges(where, angles, arm, tolerance, 0.5)
+    _check_ranges(where, angles, arm, tolerance, _MOST_BEYOND)
     scale = tolerance.scale
     ranges = np.array([joint.range_deg for joint in arm.driven]) / scale[:, None]
     words = DEG.word if np.any(scale != 1.0) else arm.texts.unit_words
@@ -410,7 +419,7 @@ def _unwound(
     A joint that moves by more than half a turn between two points, faster than its speed limit, has been recorded
     within a turn: it goes on by the short way. So it does if only that way goes on as before and after the two points,
     and the range allows it. Raises InputError, with ``where`` of the point, if it is faster than its
-    limit that way too, or leaves its range. ``times_s``: (n,), increasing.
+    limit, and than before and after, that way too, or leaves its range. ``times_s``: (n,), increasing.
     """
     found = angles_deg.copy()
     notes = []
@@ -422,7 +431,8 @@ def _unwound(
         turns = -360.0 * np.round(steps / 360.0)
         limit = joint.limits.speed_deg_s * np.diff(times_s) * _SPEED_MARGIN
         jumps = np.flatnonzero((np.abs(steps) > 180.0) & (np.abs(steps) > limit))
-        likely = np.union1d(jumps, _likely(steps, turns, times_s))
+        as_beside = _likely(steps, turns, times_s)
+        likely = np.union1d(jumps, as_beside)
         whole = column + np.concatenate(
             ([0.0], np.cumsum(np.where(np.isin(np.arange(len(steps)), likely), turns, 0.0)))
         )
@@ -430,7 +440,7 @@ def _unwound(
             jumps = likely
         for jump in jumps.tolist():
             turn = turns[jump]
-            if abs(steps[jump] + turn) > limit[jump]:
+            if abs(steps[jump] + turn) > limit[jump] and jump not in as_beside:
                 raise InputError(
                     f"{where[jump + 1]}: {joint.name} jumps from {angles_deg[jump, number]:g} to "
                     f"{angles_deg[jump + 1, number]:g} degrees, faster than its speed limit",

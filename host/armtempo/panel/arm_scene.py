@@ -24,9 +24,13 @@ from armtempo.model.workspace import FAR_MM
 from armtempo.panel import words
 from armtempo.planning.workspace_check import Bodies
 
-COLOUR, GHOST, RUN, VIA, OBSTACLE = "#4477aa", "#999999", "#ee6677", "#ccbb44", "#aa3377"
-WAY, JOINT = "#66ccee", "#33557a"
-"""Paul Tol's bright scheme, which is safe for colour-blind users."""
+COLOUR, JOINT, VIA, TOOL, OBSTACLE = "#4477aa", "#78818c", "#a88400", "#228833", "#c2559a"
+WAY, RUN, DIAL = "#1f8fb8", "#ee6677", "#888888"
+AXES = ("#e0333f", "#22913a", "#3b78f0")
+"""All of these are seen on a light page and on a dark one: the contrast is 3 to 1 or more."""
+GHOST = ("#222222", "#eeeeee")
+"""Of the ghost, which is seen through: on a light page, on a dark one."""
+GHOST_OPACITY = 0.55
 _THICK = (0.042, 0.016)
 """Radii of the first and the last link of an arm whose file gives none, as fractions of its reach."""
 _HOUSING = (1.3, 1.2)
@@ -35,8 +39,8 @@ _DOT = 0.022
 """Radius of a via point's ball."""
 _SHORT_MM = 1e-6
 _OPPOSITE = 1e-9
-_GHOST_OPACITY = 0.25
 _OBSTACLE_OPACITY = 0.3
+"""Of the faces of a box, whose edges are opaque."""
 _SHOWN = 1.2
 """Size of the displayed walls, as a fraction of the arm's reach."""
 _VIA_NAME = "via "
@@ -44,10 +48,12 @@ FOLLOW = "follow"
 """The view that keeps the tool in the middle."""
 EYES = {"side": (0.0, -1.4, 0.25), "top": (0.0, -0.001, 1.6), "free": (0.7, -0.85, 0.6)}
 """Where the views look from, from the arm's middle; from above x is to the right and y up."""
-_TARGET = (0.0, 0.0, 0.15)
+_NEAR = 0.6
+"""An arm whose home posture reaches further from what they look at is looked at from further away."""
+TARGET = (0.0, 0.0, 0.15)
 """What they look at, from there."""
-_SLOW_TO_FAST = ((0.20, 0.35, 0.75), (0.13, 0.55, 0.35), (0.85, 0.65, 0.10), (0.85, 0.15, 0.25))
-"""Colours of a path, red, green and blue, seen on light and dark: blue where it is slow, red where it is fastest."""
+SLOW_TO_FAST = ((0.25, 0.42, 0.80), (0.13, 0.55, 0.35), (0.70, 0.50, 0.05), (0.87, 0.20, 0.28))
+"""Colours of a path, sRGB, seen on light and dark as well: blue where it is slow, red where it is fastest."""
 
 
 class Obstacle(NamedTuple):
@@ -80,6 +86,13 @@ class ArmShape:
         self.reach_mm = self.reach_mm or 1.0
         self.middle = middle_mm / self.reach_mm
         """What the arm's base is next to when each rail that carries it is in the middle of its range, (3,)."""
+
+    def eye(self, view: str) -> Array:
+        """Where a view looks from, (3,), so that the home posture is in it."""
+        target = self.middle + TARGET
+        away = np.linalg.norm(self.outline(np.array(self.arm.home_deg)) - target, axis=1).max()
+        found: Array = target + max(1.0, away / _NEAR) * (np.array(EYES[view]) - TARGET)
+        return found
 
     def outline(self, angles_deg: Array) -> Array:
         """Points of the arm's line, (K, 3), for driven angles (J,)."""
@@ -236,8 +249,8 @@ def colours_of_speed(points_mm: Array, times_s: Array) -> tuple[Array, float]:
     """Colours, red, green and blue, (N, 3), of the points of a path, (N, 3), by its speed, and the highest, mm/s."""
     speeds = np.linalg.norm(np.gradient(points_mm, times_s, axis=0), axis=1)
     fastest = float(speeds.max())
-    parts = speeds / (fastest or 1.0) * (len(_SLOW_TO_FAST) - 1)
-    scale = np.array(_SLOW_TO_FAST)
+    parts = speeds / (fastest or 1.0) * (len(SLOW_TO_FAST) - 1)
+    scale = np.array(SLOW_TO_FAST)
     columns = [np.interp(parts, np.arange(len(scale)), scale[:, one]) for one in range(3)]
     return np.column_stack(columns), fastest
 
@@ -262,7 +275,7 @@ class ArmScene:
             # as simple shapes, or as the meshes that the arm has, whose poses come after those of the shapes
             simple = len(shape.pieces) + len(shape.housings)
             self._links = [""] * simple + self._meshes() if shape.meshes else self._body(COLOUR, JOINT, 1.0)
-            self._ghost = self._body(GHOST, GHOST, _GHOST_OPACITY)
+            self._ghost = self._body(GHOST[0], GHOST[0], GHOST_OPACITY)
         self._walls: list[Object3D] = []
         self.draw_workspace()
         self.draw_frames()
@@ -300,12 +313,13 @@ class ArmScene:
             self._walls.pop().delete()
         with self.scene:
             for low, high, axes in self._shape.workspace:
-                is_wall = not (high - low).all()
-                width, height, depth = (high - low).tolist()
-                box = self.scene.box(width, height, depth, wireframe=is_wall)
                 middle = axes[:3, :3] @ ((low + high) / 2) + axes[:3, 3]
-                box.material(OBSTACLE, _OBSTACLE_OPACITY).move(*middle.tolist())
-                self._walls.append(box.rotate_R(axes[:3, :3].tolist()))
+                width, height, depth = (high - low).tolist()
+                with self.scene.group() as box:
+                    self.scene.box(width, height, depth, wireframe=True).material(OBSTACLE)
+                    if width and height and depth:  # no wall
+                        self.scene.box(width, height, depth).material(OBSTACLE, _OBSTACLE_OPACITY)
+                self._walls.append(box.move(*middle.tolist()).rotate_R(axes[:3, :3].tolist()))
 
     def draw_frames(self) -> None:
         """The arm's frames as it has them now, each with its name."""
@@ -313,20 +327,20 @@ class ArmScene:
 
     @property
     def parts(self) -> str:
-        """The scene for the page's script, as JSON: its links and its ghost, the joints' ranges in rad."""
+        """The scene for the page's script, as JSON: its links and its ghost, the joints' ranges in rad, colours."""
         ranges = [
             [0.0, 0.0] if joint.slides else np.radians(joint.range_deg).round(4).tolist()
             for joint in self._shape.arm.driven
         ]
-        return json.dumps(
-            {"scene": self.scene.id, "links": self._links, "ghost": self._ghost, "ranges": ranges}
-        )
+        colours = {"axes": AXES, "dial": DIAL, "ghost": GHOST, "tool": TOOL}
+        found = {"scene": self.scene.id, "links": self._links, "ghost": self._ghost, "ranges": ranges}
+        return json.dumps({**found, "colours": colours})
 
     def look(self, view: str) -> None:
         """Look from the side, from above, from in front and above, or follow the tool."""
         if view != FOLLOW:
             names = ("x", "y", "z", "look_at_x", "look_at_y", "look_at_z")
-            eye, target = self._shape.middle + EYES[view], self._shape.middle + _TARGET
+            eye, target = self._shape.eye(view), self._shape.middle + TARGET
             places = dict(zip(names, (*eye.tolist(), *target.tolist()), strict=True))
             self.scene.move_camera(**places, duration=0.3)
         ui.run_javascript(f"armtempo.follow = {json.dumps(view == FOLLOW)}")

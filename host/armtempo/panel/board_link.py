@@ -102,8 +102,8 @@ class BoardLink:
         self._board, self.trouble = board, ""
 
     def _tell(self, text: str) -> None:
-        """Store a message about the connection as ``trouble``, until the board reports its state again."""
-        self.trouble = words.of_text(text)
+        """Show a message about the connection; the first is ``trouble`` until the board reports its state again."""
+        self.trouble = self.trouble or words.of_text(text)
         self.say(text)
 
     def without_board(self, call: Callable[[], object]) -> None:
@@ -144,8 +144,9 @@ class BoardLink:
                     self.trouble = ""
                     self._heard(asked_s)
             except ArmtempoError as error:
-                if board is self._board:
-                    self.trouble = words.of_error(error)
+                if board is self._board and self.trouble != (trouble := words.of_error(error)):
+                    self.trouble = trouble
+                    self.say(trouble)
             except Exception:  # a bug: logged, and states continue
                 _LOG.exception("panel: the board's state")
 

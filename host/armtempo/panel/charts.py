@@ -12,7 +12,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.joint_unit import DEG
 from armtempo.panel import words
 
-COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
+COLOURS = ("#4477aa", "#ee6677", "#228833", "#a07c00", "#1a9c9c", "#aa3377")
 """Paul Tol's bright scheme."""
 DASHES = ("solid", "dashed", "dotted")
 _GRID = {"lineStyle": {"color": "rgba(128, 128, 128, 0.3)"}}

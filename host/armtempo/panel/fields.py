@@ -7,12 +7,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from nicegui import ui
+from nicegui.element import Element
+
 from armtempo.basics.errors import InputError
 from armtempo.panel import words
 
 
 @dataclass
 class _Field:
+    element: Element
     show: Callable[[Any], object]
     value: Callable[[], object]
     shown: object
@@ -24,9 +28,11 @@ class Fields:
     def __init__(self) -> None:
         self._fields: list[_Field] = []
 
-    def add(self, show: Callable[[Any], object], value: Callable[[], object]) -> None:
-        """A field that was built with ``value()``; ``show`` puts another one in its place."""
-        self._fields.append(_Field(show, value, value()))
+    def add(
+        self, element: Any, value: Callable[[], object], show: Callable[[Any], object] | None = None
+    ) -> None:
+        """An element that was built with ``value()``; ``show``, or its ``set_value``, shows another one."""
+        self._fields.append(_Field(element, show or element.set_value, value, value()))
 
     def clear(self) -> None:
         """They are built anew."""
@@ -38,6 +44,16 @@ class Fields:
             if (now := field.value()) != field.shown:
                 field.shown = now
                 field.show(now)
+
+    def send_again(self) -> None:
+        """What the file has: what was typed while the connection was broken has not arrived.
+
+        Nothing is built anew, which would close a list that is open.
+        """
+        for field in self._fields:
+            field.element.update()
+            if isinstance(field.element, ui.input):
+                field.element.run_method("updateValue")
 
 
 @contextmanager

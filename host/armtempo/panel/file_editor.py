@@ -37,6 +37,9 @@ class FileEditor(ABC):
         self._values: dict[str, Any] = {}
         self._saved = ""
         self._undo: list[str] = []
+        self.looked_ns = -1
+        """Time of the file when it was last compared with what was saved."""
+        self._is_other = False
         self._kinds: dict[Path, tuple[int, bool]] = {}
         """Whether each file of the folder is one of this kind, with the time of what was read."""
 
@@ -46,7 +49,7 @@ class FileEditor(ABC):
 
     @abstractmethod
     def is_one(self, path: Path) -> bool:
-        """Whether a file is of this kind."""
+        """Whether a file is of this kind, or no TOML: opening it says why it cannot be edited."""
 
     @abstractmethod
     def check(self, text: str, file: Path) -> None:
@@ -99,7 +102,25 @@ class FileEditor(ABC):
     def take(self, file: Path, text: str) -> None:
         """Edit the text of a file that was checked."""
         self._set(text)
+        self._took(file, text)
+
+    def _took(self, file: Path, text: str) -> None:
         self.file, self._saved = file, text
+        self.looked_ns, self._is_other = -1, False
+
+    def is_other_on_disk(self) -> bool:
+        """Whether another program has changed the file since; it is read only if its time has changed."""
+        if self.file is None:
+            return False
+        with suppress(OSError, InputError):  # it is gone; saving makes it again
+            if (now_ns := self.file.stat().st_mtime_ns) != self.looked_ns:
+                self.looked_ns, self._is_other = now_ns, _read(self.file) != self._saved
+        return self._is_other
+
+    @property
+    def has_changes(self) -> bool:
+        """Whether something would be lost with what is edited."""
+        return self.can_undo and not self.is_saved
 
     def new(self, name: str) -> None:
         """Edit a new one; raises InputError for a name that is not valid on the board."""
@@ -140,7 +161,7 @@ class FileEditor(ABC):
             )
         self.check(self.text, file)
         replace_text(file, self.text)
-        self.file, self._saved = file, self.text
+        self._took(file, self.text)
         return file
 
     def _check_name(self, name: str) -> None:

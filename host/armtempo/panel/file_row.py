@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from nicegui import ui
+from nicegui import background_tasks, ui
 
 from armtempo.basics.errors import InputError
 from armtempo.panel import words
@@ -41,7 +41,11 @@ class FileRow:
                 (words.UNDO, partial(self.change, editor.undo), self._why_no_undo),
             ):
                 page.button(text, call, Needs.CONTROL, why_not)
-        self._state = ui.label("").classes("armtempo-note").props('role="status"')
+        with ui.row() as self._place:
+            self._state = ui.label("").classes("armtempo-note").props('role="status"')
+            self._again = page.button(words.READ_AGAIN, self._ask_again, Needs.CONTROL, look="flat dense")
+        self._tried = -1
+        """Time of the file when it was tried to open it again."""
 
     def change(self, call: Callable[..., object], *arguments: Any) -> None:
         """Change what is edited, or its file; the last argument is the press."""
@@ -71,15 +75,47 @@ class FileRow:
         return "" if self._editor.can_undo else words.NOTHING_TO_UNDO
 
     async def _open(self, event: Any) -> None:
-        """Open a file, which is checked in a thread: a pose that nothing reaches takes half a second."""
+        """Open the chosen file."""
         if event.value in (None, self._opened):
             return
-        editor, name = self._editor, str(event.value)
+        name = str(event.value)
         if not self._page.operator.why_not(self._page.client, Needs.CONTROL):
-            found = await self._page.threaded(lambda: self._call(editor.to_open, name))
-            if found is not None:
-                editor.take(*found)
+            if self._editor.has_changes:
+                self._ask_lose(name)
+            else:
+                await self._take(name)
         self._files.set_value(self._opened)  # the previous one, if it was refused
+
+    async def _take(self, name: str) -> None:
+        """Open a file, which is checked in a thread: a pose that nothing reaches takes half a second."""
+        found = await self._page.threaded(lambda: self._call(self._editor.to_open, name))
+        if found is not None:
+            self._editor.take(*found)
+
+    def _ask_lose(self, name: str) -> None:
+        """Open a file after a question, as it takes the place of changes."""
+
+        def lose(press: Press) -> Awaitable[object]:
+            self._page.operator.check(self._page.client, press, Needs.CONTROL)
+            return self._take(name)
+
+        self._page.ask(self._sure(), words.LOSE, lose)
+
+    def _sure(self) -> str:
+        editor = self._editor
+        return words.SURE_LOSE.format(name=words.plain(editor.name)) if editor.has_changes else ""
+
+    def _ask_again(self, _: Press) -> None:
+        self._ask_lose(self._opened or "")
+
+    async def _read_again(self) -> None:
+        """Show what another program has written, unless something was changed here, or another page has done it."""
+        editor, name = self._editor, self._opened or ""
+        with self._place:
+            found = await self._page.threaded(lambda: self._call(editor.to_open, name))
+            if found is not None and editor.is_other_on_disk() and not editor.has_changes:
+                editor.take(*found)
+                ui.notify(words.WAS_READ_AGAIN.format(name=words.plain(name)))
 
     @property
     def _opened(self) -> str | None:
@@ -95,7 +131,8 @@ class FileRow:
         def answered(press: Press) -> None:
             self.change(lambda: call(str(name.value or "").strip()), press)
 
-        with self._page.ask("", text.rstrip("…"), answered).place:
+        question = self._sure() if text == words.NEW else ""
+        with self._page.ask(question, text.rstrip("…"), answered).place:
             name = ui.input(words.NEW_NAME).props("dense outlined")
 
     def look(self) -> None:
@@ -108,5 +145,12 @@ class FileRow:
         opened = self._opened if self._opened in self._files.options else None
         if self._files.value != opened:
             self._files.set_value(opened)
+        is_other = editor.is_other_on_disk()
+        self._again.set_visibility(is_other)
+        if is_other and not editor.has_changes and self._tried != editor.looked_ns:
+            self._tried = editor.looked_ns  # one that cannot be opened is tried once
+            background_tasks.create(self._read_again())
         saved = words.IS_SAVED if editor.is_saved else words.NOT_SAVED
+        if is_other:
+            saved = f"{saved} · {words.OTHER_ON_DISK}" if editor.has_changes else words.OTHER_ON_DISK
         self._state.set_text(f"{words.plain(editor.name)} · {saved}" if editor.text else words.NOTHING_OPEN)

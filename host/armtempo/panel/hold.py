@@ -9,6 +9,7 @@ from armtempo.panel import words
 from armtempo.panel.panel_board import Needs, PanelBoard
 from armtempo.panel.press import Press
 from armtempo.robot.jog import HeldJog
+from armtempo.robot.stop_request import Stopped
 
 ALIVE_S = 0.35
 """A button counts as released this long after the browser's last report, which comes every 0.1 s."""
@@ -46,17 +47,23 @@ class ButtonHold:
         self._operator.do(what, client, press, work, Needs.MOVE, begin)
 
     def _move(self, client: str, number: int, planned: HeldJog, begin_s: float) -> None:
+        """Move while it is held; raises Stopped, with the reason, if it ended before it was released."""
+        live = self._operator.live
         while self.held(client, number) and self._presses.clock() < begin_s:
             time.sleep(_STEP_S / 5)
         if self.held(client, number):  # it may have been released meanwhile
-            with planned as jog:
-                while self.held(client, number) and jog.hold(_STEP_S):
-                    self._operator.live.angles_deg = jog.angles_deg
-                silent = self._is(client, number) and self._presses.clock() - self._said_s >= ALIVE_S
+            live.held = True
+            try:
+                with planned as jog:
+                    while self.held(client, number) and jog.hold(_STEP_S):
+                        live.angles_deg = jog.angles_deg
+                    silent = self._is(client, number) and self._presses.clock() - self._said_s >= ALIVE_S
+            finally:
+                live.held = False
             if why := jog.ends or (
                 words.BROWSER_SILENT if silent and client == self._operator.holder else ""
             ):
-                self._operator.say(words.ENDED.format(why=why))
+                raise Stopped(why)
 
     def alive(self, client: str, press: Press) -> None:
         """The browser reports that the button of its press ``press.number`` was held at that time."""

@@ -13,7 +13,7 @@ from tomlkit.items import Array
 
 from armtempo.basics import toml_table
 from armtempo.basics.errors import ArmtempoError, InputError
-from armtempo.encoding import planned_for
+from armtempo.encoding import made_with
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.joint_unit import NEUTRAL
@@ -65,11 +65,11 @@ class JobEditor(FileEditor):
         return f'name = "{name}"\n{self.arm.texts.list_key("via_deg")} = [\n    [{row}],\n    [{row}],\n]\n'
 
     def is_one(self, path: Path) -> bool:
-        """Whether a file describes a job."""
+        """Whether a file describes a job, or is no TOML."""
         try:
             table = toml_table.read(path)
         except InputError:
-            return False
+            return True
         listed = any(table.has(key) for key in ("via", _LIST, NEUTRAL[_LIST]))
         return table.has("name") and listed and not table.has("joint")
 
@@ -168,7 +168,7 @@ class JobEditor(FileEditor):
         """Whether a frame or the tool of the plan has changed."""
         try:
             if self.plan is not None:
-                planned_for.check_surroundings(self.plan.name, self.plan, arm)
+                made_with.check_surroundings(self.plan.name, self.plan, arm)
         except InputError:
             return True
         return False

@@ -55,11 +55,8 @@ class JobTab:
         self._draw_vias()
         page.on_look(self._look)
         page.on_arm(self._options.refresh)  # the frames and tools to choose
-        # Texts typed while the connection was broken have not arrived
-        ui.context.client.on_connect(self._connected)
-
-    def _connected(self) -> None:
-        self._built, self._shown = None, (-1, False)
+        ui.context.client.on_connect(self._cells.send_again)
+        ui.context.client.on_connect(self._choices.send_again)
 
     # the table
 
@@ -72,7 +69,9 @@ class JobTab:
         grid = ui.element("div").classes("armtempo-grid").style(f"grid-template-columns: {columns}")
         with grid:
             for text in ("", "", *(joint.labelled for joint in joints), ""):
-                ui.label(words.plain(text)).classes("text-caption ellipsis")
+                ui.label(words.plain(text)).classes("text-caption ellipsis").props["title"] = words.plain(
+                    text
+                )
         build_rows(grid, len(self._jobs.vias), self._row)
         with ui.row():
             ui.button(
@@ -98,12 +97,12 @@ class JobTab:
         ui.label(f"P{number}")
         with ui.label(_kind(via)).classes("armtempo-note") as kind:
             hint = ui.tooltip(_hint(via))
-        self._cells.add(kind.set_text, self._of(number, _kind))
-        self._cells.add(hint.set_text, self._of(number, _hint))
+        self._cells.add(kind, self._of(number, _kind), kind.set_text)
+        self._cells.add(hint, self._of(number, _hint), hint.set_text)
         for index, joint in enumerate(self._operator.arm.driven):
             box = ui.input(value=_cell(index, via)).props("dense outlined inputmode=decimal")
             named(box, f"P{number} {joint.name}")
-            self._cells.add(box.set_value, self._of(number, partial(_cell, index)))
+            self._cells.add(box, self._of(number, partial(_cell, index)))
             if via.form == ANGLES:
                 self._on_typed(box, self._jobs.set_angle, number, index)
             else:
@@ -144,12 +143,12 @@ class JobTab:
                 if key in _SWITCHES:
                     switch = ui.switch(label, value=text == "true")
                     named(switch, f"P{number}: {label}")
-                    self._cells.add(partial(_switch, switch), value)
+                    self._cells.add(switch, value, partial(_switch, switch))
                     switch.on_value_change(lambda event, key=key: self._turn(number, key, event.value))
                     continue
                 box = ui.input(label, value=text).props("dense outlined").classes("armtempo-value")
                 named(box, f"P{number}: {label}")
-                self._cells.add(box.set_value, value)
+                self._cells.add(box, value)
                 self._on_typed(box, self._jobs.set_key, number, key)
 
     def _turn(self, number: int, key: str, on: bool) -> None:
@@ -264,7 +263,7 @@ class JobTab:
                 return
         if choices is None:
             box = ui.input(label, value=value).props("dense outlined").classes("armtempo-wide")
-            self._choices.add(box.set_value, partial(self._jobs.option, key))
+            self._choices.add(box, partial(self._jobs.option, key))
             self._on_typed(box, self._jobs.set_option, key)
             return
         texts = {"": words.DEFAULT, **{str(one): words.CHOICES.get(str(one), str(one)) for one in choices}}
@@ -272,7 +271,7 @@ class JobTab:
             texts[value] = words.plain(value)
         chosen = ui.select(texts, value=value, label=label).props("dense outlined").classes("armtempo-option")
         chosen.on_value_change(lambda event: self._edit(self._jobs.set_option, key, str(event.value or "")))
-        self._choices.add(chosen.set_value, partial(self._jobs.option, key))
+        self._choices.add(chosen, partial(self._jobs.option, key))
 
     def _look(self) -> None:
         """Show what has changed, also on another page; the angles of poses come a little later."""

@@ -109,9 +109,11 @@ def _views(page: PanelPage) -> None:
         frames.on_value_change(
             lambda event: ui.run_javascript(f"armtempo.show_frames({json.dumps(event.value)})")
         )
+    scale = ", ".join(f"rgb({255 * r:.0f} {255 * g:.0f} {255 * b:.0f})" for r, g, b in arm_scene.SLOW_TO_FAST)
     page.speeds = ui.label("").classes("armtempo-speed-scale")
+    page.speeds.style(f"background-image: linear-gradient(to right, {scale})")
     page.speeds.set_visibility(False)
-    ui.label(words.UNKNOWN).classes("armtempo-unknown")
+    page.live_label("armtempo-unknown")
 
 
 def _dock(page: PanelPage) -> None:
@@ -258,6 +260,7 @@ def message(operator: PanelBoard, shape: ArmShape) -> dict[str, Any]:
         "tool": shape.tool(angles) if live.known else None,
         "ghost": poses if not live.known else None if target is None else shape.poses(target),
         "unknown": not live.known,
+        "old": live_texts.is_old(operator),
         "freeze": operator.can_freeze,
         "texts": live_texts.texts(operator),
     }

@@ -106,6 +106,10 @@ class LiveArm:
         """When the board last said where the arm is."""
         self.guided = False
         """Whether it is guided by hand."""
+        self.held = False
+        """Whether it moves as long as a button is held: that it brakes then is no pause."""
+        self.sought = False
+        """Whether it is homed by its switches: the board counts from where it only assumes the joints to be."""
         self.doubt = ""
         """Text: why the arm may be elsewhere than the board says; "" after it was homed."""
         self.sequence: SequenceState | None = None
@@ -123,7 +127,9 @@ class LiveArm:
     @property
     def known(self) -> bool:
         """Whether the board knows where the arm is, or its encoders tell while it is guided by hand."""
-        return self.guided or self.state is None or all(joint.known for joint in self.state.joints)
+        if self.guided or self.sought:
+            return self.guided
+        return self.state is not None and all(joint.known for joint in self.state.joints)
 
     @property
     def fault(self) -> str:

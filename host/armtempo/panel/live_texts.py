@@ -24,6 +24,7 @@ def texts(operator: PanelBoard) -> dict[str, str]:
         "armtempo-state": words.plain(state_line(operator)),
         "armtempo-where": position(operator) if live.known else words.UNKNOWN,
         "armtempo-said": words.plain(said),
+        "armtempo-unknown": words.OLD_STATE.format(age=live.age_s) if is_old(operator) else words.UNKNOWN,
     }
     for number, (angle, joint) in enumerate(zip(live.angles_deg, operator.arm.driven, strict=True), 1):
         found[f"armtempo-angle-{number}"] = f"{angle:.2f}{joint.unit.sign}" if live.known else "?"
@@ -43,6 +44,11 @@ def position(operator: PanelBoard) -> str:
     return where
 
 
+def is_old(operator: PanelBoard) -> bool:
+    """Whether the arm may have moved since the board was last heard: it was known, and the connection is broken."""
+    return bool(operator.trouble) and operator.live.known and operator.live.age_s > OLD_S
+
+
 def state_line(operator: PanelBoard) -> str:
     """The board's state in a line, with its age if that is more than OLD_S."""
     doing = f" · {operator.busy}" if operator.busy else ""
@@ -56,7 +62,7 @@ def state_line(operator: PanelBoard) -> str:
     kind = f" ({words.VIRTUAL})" if state.virtual else ""
     name = state.state
     if state.moving and not state.speed_percent:
-        name = words.PAUSED
+        name = state.state if operator.live.held else words.PAUSED
     elif state.moving and state.speed_percent != 100:
         name += f" {words.AT_SPEED.format(percent=state.speed_percent)}"
     fault = f" · {state.fault}" if state.fault else ""

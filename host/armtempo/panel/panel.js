@@ -23,6 +23,7 @@ window.armtempo = {
   names: [], // three.js objects: the names
   named: [], // the arm's frames
   framed: [undefined, undefined], // what was drawn of them
+  shaded: "", // for which page the ghost has its colour
   frames: null, // three.js objects: of the base, the tool and the named ones
   frames_shown: true,
   follow: false,
@@ -71,6 +72,7 @@ window.armtempo = {
     document.body.inert = false;
     this.target = message.ghost;
     document.body.classList.toggle("unknown", message.unknown); // the arm is then drawn as its ghost
+    document.body.classList.toggle("old", message.old); // nobody knows where it is now
     document.body.classList.toggle("freezes", message.freeze);
     if (JSON.stringify(message.tool) !== JSON.stringify(this.tool)) this.tool = message.tool;
     if (JSON.stringify(message.dials) !== JSON.stringify(this.angles)) this.angles = message.dials;
@@ -101,11 +103,22 @@ window.armtempo = {
     const scene = this.parts && getElement(this.parts.scene);
     if (scene && scene.objects) {
       this.begin_scene(scene);
+      this.shade(scene);
       this.place(scene, this.parts.links, this.now());
       this.place(scene, this.parts.ghost, this.ghost || this.target);
       this.turn(scene);
       this.axes(scene);
     }
+  },
+
+  // the ghost: dark on a light page, light on a dark one
+  shade(scene) {
+    const dark = Number(matchMedia("(prefers-color-scheme: dark)").matches);
+    if (`${dark} ${scene.objects.size}` === this.shaded) return;
+    this.shaded = `${dark} ${scene.objects.size}`;
+    this.changes += 1;
+    for (const id of this.parts.ghost)
+      scene.objects.get(id)?.mesh?.traverse((one) => one.material?.color.set(this.parts.colours.ghost[dark]));
   },
 
   // x, y and z of the base, of the tool and of the arm's frames: red, green, blue; names; and the tool
@@ -114,7 +127,7 @@ window.armtempo = {
     const T = this.THREE;
     this.changes += 1;
     if (!this.frames) {
-      this.frames = { base: new T.AxesHelper(0.2), tool: this.frame(0.12), named: new T.Group(), body: this.body() };
+      this.frames = { base: this.frame(0.2), tool: this.frame(0.12), named: new T.Group(), body: this.body() };
       for (const one of Object.values(this.frames)) scene.scene.add(one);
       this.show_frames(this.frames_shown);
     }
@@ -141,11 +154,11 @@ window.armtempo = {
   },
 
   body() {
-    return new this.THREE.Mesh(new this.THREE.CylinderGeometry(1, 1, 1, 20), new this.THREE.MeshPhongMaterial({ color: "#228833" }));
+    return new this.THREE.Mesh(new this.THREE.CylinderGeometry(1, 1, 1, 20), new this.THREE.MeshPhongMaterial({ color: this.parts.colours.tool }));
   },
 
   frame(length, name) {
-    const found = new this.THREE.AxesHelper(length);
+    const found = new this.THREE.AxesHelper(length).setColors(...this.parts.colours.axes.map((one) => new this.THREE.Color(one)));
     found.matrixAutoUpdate = false;
     if (name) {
       const text = document.createElement("div");
@@ -265,7 +278,8 @@ window.armtempo = {
     const T = this.THREE;
     const shape = new T.BufferGeometry().setFromPoints(points.map((point) => new T.Vector3(...point)));
     if (!Array.isArray(colour)) return new T.Line(shape, new T.LineBasicMaterial({ color: colour }));
-    shape.setAttribute("color", new T.Float32BufferAttribute(colour, 3));
+    const linear = points.map((_, i) => new T.Color().setRGB(...colour.slice(3 * i, 3 * i + 3), T.SRGBColorSpace).toArray());
+    shape.setAttribute("color", new T.Float32BufferAttribute(linear.flat(), 3));
     return new T.Line(shape, new T.LineBasicMaterial({ vertexColors: true }));
   },
 
@@ -282,8 +296,8 @@ window.armtempo = {
         const arc = Array.from({ length: 49 }, (_, k) => low + ((high - low) * k) / 48);
         const on = (angle) => [RADIUS * Math.cos(angle), RADIUS * Math.sin(angle), 0];
         const group = new T.Group();
-        group.add(this.polyline([[0, 0, 0], ...arc.map(on), [0, 0, 0]], "#999999"));
-        group.add(this.polyline([[0, 0, 0], [1.25 * RADIUS, 0, 0]], "#999999"));
+        group.add(this.polyline([[0, 0, 0], ...arc.map(on), [0, 0, 0]], this.parts.colours.dial));
+        group.add(this.polyline([[0, 0, 0], [1.25 * RADIUS, 0, 0]], this.parts.colours.dial));
         group.visible = low < high; // a sliding joint has no dial
         scene.scene.add((this.dials[i] = group));
       }

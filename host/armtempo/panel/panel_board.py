@@ -16,7 +16,6 @@ from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link.traffic import Sink
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.panel import words
 from armtempo.panel.board_link import BoardLink
 from armtempo.panel.job_editor import JobEditor
@@ -82,6 +81,8 @@ class PanelBoard(BoardLink):
         """Text: the running command."""
         self.progress = 0.0
         """Its progress, 0 to 1."""
+        self.left = 0.0
+        """What is left of it; of a run in seconds of motion."""
         self.failure = ""
         """Text: why the last command failed; "" after the next one has begun."""
         self.guiding = False
@@ -227,7 +228,11 @@ class PanelBoard(BoardLink):
 
     def home_to_switches(self, joint: str | None = None) -> None:
         """Home the joints that have switches, or one of them alone; each that is at home is told."""
-        self.board.home_to_switches(self.arm, joint=joint, progress=self._tell_homing)
+        self.live.sought = True
+        try:
+            self.board.home_to_switches(self.arm, joint=joint, progress=self._tell_homing)
+        finally:
+            self.live.sought = False
         self._homed(joint)
 
     def _tell_homing(self, text: str, done: int, whole: int) -> None:
@@ -265,10 +270,11 @@ class PanelBoard(BoardLink):
     def run(self, plan: Plan, times: int) -> None:
         """Load a plan and run it; its report is made when it is asked for."""
         self.upload(plan)
+        self.part(0.0, times * plan.total_s)
         self.live.plan = plan
         self.board.run(plan, times, self.runs, self.part, stop=self._stop)
 
-    def run_sequence(self, sequence: SequencePlan | str) -> None:
+    def run_sequence(self, sequence: Plan | str) -> None:
         """Run a planned sequence, stored in the place of another one of its name; or the stored one of that name."""
         take = self.live.take_sequence
         take(self.board.run_sequence(sequence, take, self._stop, replace=True, out=self.runs))
@@ -285,7 +291,7 @@ class PanelBoard(BoardLink):
 
     def part(self, done: float, whole: float) -> None:
         """Store the progress of the running command."""
-        self.progress = done / whole if whole else 0.0
+        self.left, self.progress = whole - done, done / whole if whole else 0.0
 
     def preparing(self, done: float, whole: float) -> None:
         """As ``part``, of what is done before something moves: it ends, with Stopped, if a stop was asked for."""

@@ -13,9 +13,10 @@ from typing import Any, TypeVar
 import numpy as np
 from nicegui import background_tasks, run, ui
 from nicegui.element import Element
+from nicegui.elements.mixins.disableable_element import DisableableElement
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import ArmtempoError
+from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.chain import chains_mm
 from armtempo.model.arm import Arm
 from armtempo.panel import arm_scene, live_texts, words
@@ -134,6 +135,10 @@ class PanelPage:
         def why_not() -> str:
             return (self.operator.why_not(self.client, needs) if needs is not None else "") or more()
 
+        if isinstance(
+            element, DisableableElement
+        ):  # ``on_press`` says why a press just after that is refused
+            element.ignores_events_when_disabled = False
         control = _Control(element, why_not, is_held)
         control.grey(control.why_not())
         self.controls.append(control)
@@ -160,12 +165,22 @@ class PanelPage:
         return made
 
     def on_press(self, element: Element, event: str, call: Callable[[Press, Any], object]) -> None:
-        """Call ``call`` with what the page says of a press, and with the value of the event, if it has one."""
+        """Call ``call`` with what the page says of a press, and with the value of the event, if it has one.
+
+        A press that comes just after the element was disabled is refused with the reason.
+        """
 
         def pressed(event: Any) -> Any:
             said, value = event.args
             found: list[object] = []
-            self.answer(said, self.refusal(lambda: found.append(call(Press.of(said), value))))
+
+            def take() -> None:
+                for control in self.controls:
+                    if control.element is element and (reason := control.why_not()):
+                        raise InputError(reason, words.WAIT)
+                found.append(call(Press.of(said), value))
+
+            self.answer(said, self.refusal(take))
             return found[0] if found else None
 
         element.on(event, pressed, js_handler="(event) => armtempo.command(event, emit)")

@@ -44,15 +44,16 @@ class Problem:
 def of(operator: PanelBoard) -> Problem | None:
     """The most important one; None if nothing is wrong."""
     live = operator.live
-    if operator.trouble and not operator.busy:
+    is_known = live.state is None or live.known  # one that is deployed to says nothing
+    if operator.trouble and (operator.has_board or not operator.busy):
         return Problem(operator.trouble, () if operator.has_board else (Cure.DEPLOY,))
     if live.fault:
         return Problem(words.of_text(live.fault), (Cure.CLEAR,))
     if live.doubt:
         return Problem(live.doubt, (Cure.HOME,))
     if operator.failure:
-        return Problem(operator.failure, (Cure.DISMISS,))
-    if live.state is not None and not live.known and not operator.busy:
+        return Problem(operator.failure, (Cure.DISMISS,) if is_known else (Cure.HOME, Cure.DISMISS))
+    if not is_known and not operator.busy:
         return Problem(words.FIRST_HOME, (Cure.HOME,), is_fault=False)
     return None
 

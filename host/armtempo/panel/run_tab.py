@@ -114,9 +114,14 @@ class RunTab:
         self._bar.set_visibility(running is not None)
         self._left.set_visibility(running is not None)
         if running is not None:
-            left_s = max(0.0, (1.0 - operator.progress) * running.total_s)
+            state = operator.live.state
+            percent = (state.speed_percent if state else None) or 100.0
             self._bar.set_value(operator.progress)
-            self._left.set_text(words.LEFT.format(name=running.job.name, part=operator.progress, left=left_s))
+            self._left.set_text(
+                words.LEFT.format(
+                    name=running.job.name, part=operator.progress, left=operator.left * 100.0 / percent
+                )
+            )
 
     def _look_at_curves(self) -> None:
         operator = self._operator

@@ -10,8 +10,8 @@ from armtempo.basics import toml_table
 from armtempo.basics.errors import InputError
 from armtempo.model.arm import Arm
 from armtempo.model.parts import NOTHING
+from armtempo.model.plan import Plan
 from armtempo.model.sequence import Sequence, is_sequence
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.model.steps import ON_TIMEOUT
 from armtempo.panel.file_editor import FileEditor, put, text_of
 from armtempo.panel.toml_blocks import TomlBlocks
@@ -50,7 +50,7 @@ class SequenceEditor(FileEditor):
 
     def __init__(self, arm: Arm, folder: Path) -> None:
         super().__init__(arm, folder)
-        self._plan: tuple[int, SequencePlan | None] = (-1, None)
+        self._plan: tuple[int, Plan | None] = (-1, None)
 
     def take_arm(self, arm: Arm) -> None:
         """Take another version of the arm, for which it is planned anew."""
@@ -62,11 +62,11 @@ class SequenceEditor(FileEditor):
         return f'name = "{name}"\n\n[[step]]\ngoto = "home"\n'
 
     def is_one(self, path: Path) -> bool:
-        """Whether a file describes a sequence."""
+        """Whether a file describes a sequence, or is no TOML."""
         try:
             return is_sequence(path)
         except InputError:
-            return False
+            return True
 
     def check(self, text: str, file: Path) -> None:
         """Raise InputError, with step and key, if the text is no sequence."""
@@ -173,11 +173,11 @@ class SequenceEditor(FileEditor):
         return Sequence.of_table(toml_table.parse(self.text, str(self.target)), self.arm)
 
     @property
-    def plan(self) -> SequencePlan | None:
+    def plan(self) -> Plan | None:
         """The plan of the present steps; None if they were not planned."""
         return self._plan[1] if self._plan[0] == self.version else None
 
-    def planned(self, plan: SequencePlan, version: int) -> None:
+    def planned(self, plan: Plan, version: int) -> None:
         """Keep a plan of the steps as they were at ``version``."""
         self._plan = version, plan
 

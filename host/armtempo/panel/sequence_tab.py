@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armtempo.basics.arrays import Array
     from armtempo.basics.progress import Progress
     from armtempo.link.board_messages import SequenceState
-    from armtempo.model.sequence_plan import SequencePlan
+    from armtempo.model.plan import Plan
     from armtempo.panel.panel_page import PanelPage
     from armtempo.panel.press import Press
 
@@ -39,12 +39,15 @@ class SequenceTab:
         self._editor = page.operator.sequences
         self._shown = self._editor.version
         self._lit = 0
-        self._fields = Fields()
-        self._built: object = None
-        """What the table was built for."""
+        self._fields: dict[int, Fields] = {}
+        """Of each row."""
+        self._jobs: list[str] = []
+        """The files of jobs that a step can name."""
+        self._built: tuple[object, list[str]] = None, []
+        """What the table was built for, as ``_form``."""
         self._rows: list[ui.row] = []
-        self._times: list[ui.label] = []
-        self._timed: SequencePlan | None = None
+        self._times: dict[int, ui.label] = {}
+        self._timed: Plan | None = None
         self._file = FileRow(page, self._editor, words.SEQUENCE_FILE, words.of_sequence)
         with ui.row():
             self._plan_row = PlanRow(
@@ -64,12 +67,13 @@ class SequenceTab:
         ui.context.client.on_connect(self._connected)
 
     def _connected(self) -> None:
-        """Show the steps again, as texts typed while the connection was broken have not arrived."""
-        self._built, self._shown = None, -1
+        for fields in self._fields.values():
+            fields.send_again()
 
-    def _form(self) -> object:
-        """What the fields are built for: their values may change without building them anew."""
-        return self._editor.file, [kind_of(step) for step in self._editor.steps], self._editor.depths
+    def _form(self) -> tuple[object, list[str]]:
+        """What the table is built for, and each row: their values may change without building them anew."""
+        kinds = [kind_of(step) for step in self._editor.steps]
+        return (self._editor.file, len(kinds), self._editor.depths), kinds
 
     def _why_nothing(self) -> str:
         return "" if self._editor.is_open else words.NO_SEQUENCE_OPEN
@@ -84,11 +88,10 @@ class SequenceTab:
 
     @ui.refreshable_method
     def _table(self) -> None:
-        self._rows, self._times, self._timed = [], [], None
-        self._fields.clear()
+        self._rows, self._times, self._fields, self._timed = [], {}, {}, None
         self._built, self._lit = self._form(), 0
-        count, jobs = len(self._editor.steps), self._operator.jobs.files()
-        build_rows(ui.column(), count, lambda index: self._row(index, jobs))
+        self._jobs, count = self._operator.jobs.files(), len(self._editor.steps)
+        build_rows(ui.column(), count, self._row)
         if self._editor.is_open:
             with ui.row():
                 add = partial(self._file.change, self._editor.add, count)
@@ -99,11 +102,18 @@ class SequenceTab:
         here_deg = [round(float(angle), 4) + 0.0 for angle in self._operator.live.angles_deg]
         self._file.change(self._editor.add, index, {"goto": here_deg}, press)
 
-    def _row(self, index: int, jobs: list[str]) -> None:
+    def _row(self, index: int) -> None:
+        row = ui.row().classes("armtempo-step").style(f"margin-left: {1.5 * self._editor.depths[index]}rem")
+        self._rows.append(row)
+        self._fill(index)
+
+    def _fill(self, index: int) -> None:
+        """Build what is in a row, for its kind of step; in other rows a list may be open."""
         page, editor = self._page, self._editor
-        step, depth = editor.steps[index], editor.depths[index]
+        step = editor.steps[index]
         kind = kind_of(step)
-        with ui.row().classes("armtempo-step").style(f"margin-left: {1.5 * depth}rem") as row:
+        self._fields[index] = Fields()
+        with self._rows[index]:
             ui.label(str(index + 1)).classes("armtempo-number")
             choice = ui.select(words.STEP_KINDS, value=kind).props("dense outlined")
             named(choice, f"{words.STEP} {index + 1}")
@@ -111,7 +121,7 @@ class SequenceTab:
             page.control(choice, Needs.CONTROL)
             for key in (kind, *KINDS[kind]):
                 label = None if key == kind else words.STEP_KEYS[key]
-                box = self._field(index, key, step.get(key, ""), label, jobs)
+                box = self._field(index, key, step.get(key, ""), label)
                 box.classes("armtempo-value" if KINDS[kind] else "armtempo-wide")
             for icon, text, call in (
                 ("arrow_upward", words.UP, partial(editor.move, index, -1)),
@@ -123,16 +133,15 @@ class SequenceTab:
                 change = partial(self._file.change, call)
                 page.button("", change, Needs.CONTROL, look=f"flat dense icon={icon}", name=name)
             time = "" if self._timed is None else _time_of(self._timed, index + 1)
-            self._times.append(ui.label(time).classes("armtempo-note"))
-        self._rows.append(row)
+            self._times[index] = ui.label(time).classes("armtempo-note")
 
-    def _field(self, index: int, key: str, value: str, label: str | None, jobs: list[str]) -> ui.input:
+    def _field(self, index: int, key: str, value: str, label: str | None) -> ui.input:
         """A field for the value of a key, with what it can name as a list."""
         # A name that cannot be shown as it is could only be completed to another one
-        choices = [name for name in self._editor.choices(key, jobs) if name == words.plain(name)]
+        choices = [name for name in self._editor.choices(key, self._jobs) if name == words.plain(name)]
         box = ui.input(label, value=value, autocomplete=choices)
         named(box.props("dense outlined"), f"{words.STEP} {index + 1}: {label or words.STEP_KINDS[key]}")
-        self._fields.add(box.set_value, lambda: self._editor.steps[index].get(key, ""))
+        self._fields[index].add(box, lambda: self._editor.steps[index].get(key, ""))
         box.on("change", lambda event: self._set(index, key, str(event.args or "").strip()))
         self._page.control(box, Needs.CONTROL)
         return box
@@ -150,10 +159,17 @@ class SequenceTab:
         self._file.look()
         if self._editor.version != self._shown:
             self._shown = self._editor.version
-            if self._form() != self._built:
+            (table, kinds), (built_table, built_kinds) = self._form(), self._built
+            if table != built_table:
                 self._table.refresh()  # later
             else:
-                self._fields.look()
+                for index, row in enumerate(self._rows):
+                    if kinds[index] == built_kinds[index]:
+                        self._fields[index].look()
+                    else:
+                        row.clear()
+                        self._fill(index)
+                self._built = table, kinds
         self._look_at_times()
         state = self._operator.live.sequence
         running = state is not None and state.ending == "running"
@@ -171,8 +187,8 @@ class SequenceTab:
         if (plan := self._editor.plan) is self._timed:
             return
         self._timed = plan
-        for index, label in enumerate(self._times, 1):
-            label.set_text("" if plan is None else _time_of(plan, index))
+        for index, label in self._times.items():
+            label.set_text("" if plan is None else _time_of(plan, index + 1))
         if plan is None:
             self._total.set_text("")
         elif plan.total is None:
@@ -183,7 +199,7 @@ class SequenceTab:
 
     # plan, play, run
 
-    def _planned(self, progress: Progress) -> SequencePlan:
+    def _planned(self, progress: Progress) -> Plan:
         """The plan of the present steps."""
         if (plan := self._editor.plan) is None:
             version = self._editor.version
@@ -199,7 +215,7 @@ class SequenceTab:
             page.stop_playing()
             return
         for row in [row for row in plan.rows if row.op == MOVE]:
-            leg = plan.legs[row.number]
+            leg = plan.legs[row.number].trajectory
             if not await page.play(leg.duration_s, partial(_show, page, leg)):
                 break
         page.show_ghost(None)
@@ -229,9 +245,13 @@ def _where(state: SequenceState) -> str:
     return f"{state.ending}: {position(state.step, state.cycle)}"
 
 
-def _time_of(plan: SequencePlan, step: int) -> str:
+def _time_of(plan: Plan, step: int) -> str:
     """The planned time of a step, once; "" for one that takes none."""
-    moves = [plan.legs[row.number].duration_s for row in plan.rows if row.step == step and row.op == MOVE]
+    moves = [
+        plan.legs[row.number].trajectory.duration_s
+        for row in plan.rows
+        if row.step == step and row.op == MOVE
+    ]
     waits = [row.amount / 1000 for row in plan.rows if row.step == step and row.op == WAIT]
     time_s: Any = sum(moves) + sum(waits)
     return f"{time_s:.2f} s" if time_s else ""

@@ -28,7 +28,6 @@ NO_BOARD, NO_BOARD_HINT = "The board is not connected.", "wait until it is"
 WAIT = "try again when that is over"
 ROW_GONE, LOOK_AGAIN = "This row is gone", "look at the rows as they are now"
 DONE = "{what}: done"
-ENDED = "It ended by itself: {why}"
 BROWSER_SILENT = "the browser was silent for 0.35 s while the button was held"
 STOPPED = "{what}: stopped: {why}"
 BRAKING = "Stop: the arm brakes along its path."
@@ -48,7 +47,8 @@ TAKE_CONTROL = "Take control"
 IN_CONTROL = "In control"
 LOST = (
     "The panel's program does not answer. Nothing can be moved or stopped from here. "
-    "A held move has ended; a motion that was started with Run goes on to its end: stop it with the E-stop."
+    "A held move has ended; a motion that was started with Run goes on to its end: stop it with the E-stop. "
+    "Once the panel is started again, open the address that it prints."
 )
 VIRTUAL = "virtual board"
 
@@ -172,6 +172,9 @@ JOB_FILE, NEW, SAVE_AS, UNDO = "Job", "New…", "Save as…", "Undo"
 NOTHING_OPEN = "Choose a file, or make a new one."
 NOTHING_TO_UNDO = "Nothing was changed."
 IS_SAVED, NOT_SAVED = "saved", "changes are not saved"
+OTHER_ON_DISK, READ_AGAIN = "changed by another program", "Open it again"
+WAS_READ_AGAIN = "{name} was changed by another program, and opened again."
+SURE_LOSE, LOSE = "{name}: its changes are not saved. Lose them?", "Lose them"
 MORE, CHANGES, INSERT, COPY = "Line, arc, stop, speed:", "Change", "Insert before", "Copy"
 AS_POSE, AS_ANGLES = "Give it as a pose", "Give it as angles"
 
@@ -248,6 +251,7 @@ STATE_KEYS = {
 }
 STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
 RENAME, REMOVE, NEW_NAME = "Rename", "Remove", "New name"
+NOTHING_STORED = "Nothing is stored on the board."
 A_SEQUENCE, A_PROGRAM, BY_BUTTON = "sequence", "program", " · started by the board's button"
 SURE_REMOVE = "Remove {name} from the board?"
 SELFTEST, SURE_SELFTEST = (
@@ -294,8 +298,8 @@ def of_job(text: str) -> str:
     """A text on the edited job, with the names of its fields instead of those of the file's keys."""
     text = of_text(text)
     for key, label in {**VIA_KEYS, **OPTIONS}.items():
-        # A key that is a usual word too is one only where a value follows
-        text = re.sub(rf"\b{key}\b" + ("" if "_" in key else "(?= =| ['\"0-9])"), f"‘{label}’", text)
+        # A key that is a usual word too is one only where a value follows, but not in "at line 1"
+        text = re.sub(rf"(?<!at )\b{key}\b" + ("" if "_" in key else "(?= =| ['\"0-9])"), f"‘{label}’", text)
     return text
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from armtempo.basics.progress import Progress
+from armtempo.model.leg import JobSolution
 from armtempo.model.plan import Plan
 from armtempo.paper import motions, printed
 from armtempo.paper.printed import DIFFERS, SAME, Claim
@@ -76,13 +77,10 @@ def claims(series: list[Series]) -> list[Claim]:
 def _unoptimised(made: motions.Plans) -> Plan:
     """The plan of the shipped job with equal intervals of 2 s."""
     joints = tuple(motions.unoptimised(made.job, joint, 5) for joint in range(len(made.arm.driven)))
-    return replace(
-        made.quintic,
-        job=replace(made.job, name="feed-unoptimised"),
-        trajectory=Trajectory("feed-unoptimised", joints, False),
-        extremes=tuple(map(extremes.of_joint, joints)),
-        searches=(),
-    )
+    plan, name = made.quintic, "feed-unoptimised"
+    found = tuple(map(extremes.of_joint, joints))
+    solution = JobSolution(replace(made.job, name=name), plan.via_deg, (), found)
+    return Plan.of_job(plan.arm, solution, Trajectory(name, joints, False), plan.notes, plan.versions)
 
 
 def _replayed(plan: Plan, folder: Path, times: int, stop: StopRequest, tell: Callable[[float], None]) -> Path:

@@ -41,17 +41,17 @@ def render(
         sheet.figure(drawing.inline_svg(figure, name, caption), caption)
     sheet.heading("How to repeat it")
     sheet.code("armtempo paper")
-    sections.plan_origin(sheet, made.quintic, _extent(searched, series))
+    sections.origin(sheet, made.quintic, _extent(searched, series))
     return sheet.render()
 
 
-def _extent(searched: Sequence[Row], series: Sequence[Series]) -> list[tuple[str, object]]:
+def _extent(searched: Sequence[Row], series: Sequence[Series]) -> list[tuple[str, str]]:
     """The amount of computation; ``--quick`` reduces it."""
     populations = ", ".join(str(population) for population in sorted({row.population for row in searched}))
     return [
         ("populations searched with", populations),
-        ("seeds for each", min(row.seeds for row in searched)),
-        ("replays of each motion", min(len(one.found.repetitions) for one in series)),
+        ("seeds for each", str(min(row.seeds for row in searched))),
+        ("replays of each motion", str(min(len(one.found.repetitions) for one in series))),
     ]
 
 

@@ -145,7 +145,8 @@ def _best_shapes(ramps: Ramps, starts_s: Array) -> tuple[Shapes, Array]:
     at_s = np.append(starts_s[:, :-1].ravel(), starts_s[-1, -1])
     some = last * parts * _COMPARED // _OF
     every = np.arange(len(RAMP_SHAPES))
-    shapes = np.unique(np.argmin(_lengths_s(ramps, at_s[some], every), axis=0))
+    best_of_some = np.argmin(_lengths_s(ramps, at_s[some], every), axis=0)
+    shapes = np.flatnonzero(np.bincount(best_of_some))  # np.unique imports numpy.ma, and a goto would wait
     found_s = _lengths_s(ramps, at_s, shapes)
     found_s = found_s[:, last * np.arange(parts)[:, None] + np.arange(last + 1)]
     best = np.argmin(found_s.sum(axis=2), axis=0)

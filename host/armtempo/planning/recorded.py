@@ -11,8 +11,9 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
+from armtempo.model.leg import JobSolution, Search
 from armtempo.model.parts import Limits
-from armtempo.model.plan import Plan, Search
+from armtempo.model.plan import Plan
 from armtempo.model.thinning import JointTolerance, Tolerance
 from armtempo.planning import board_limits, checks, lower_bounds, planner, workspace_check
 from armtempo.splines import bspline, extremes, time_axis
@@ -83,7 +84,8 @@ def plan(
     )
     kept = f"follows the recording on its own times, within {tolerance.format(off_deg)} at its points"
     long = checks.long_ways(arm, angles_deg, [f"{time:g} s" for time in times_s])
-    return Plan(arm, job, via_deg, (kept, *notes, *long), trajectory, (search,), reached, planner.versions())
+    solution = JobSolution(job, via_deg, (search,), reached)
+    return Plan.of_job(arm, solution, trajectory, (kept, *notes, *long), planner.versions())
 
 
 def _splines(points: Array, axis: Array) -> tuple[JointSpline, ...]:

@@ -11,6 +11,7 @@ from armtempo.basics.progress import Progress
 from armtempo.model import frame
 from armtempo.model.arm import Arm
 from armtempo.model.job import GRADIENT, Job
+from armtempo.model.leg import PlanLeg
 from armtempo.model.parts import NOTHING
 from armtempo.model.plan import Plan
 from armtempo.model.posture import ArmPosture
@@ -43,11 +44,7 @@ class SequenceMotions:
     progress: Progress | None
     holds: str = ""
     """The present load."""
-    legs: list[Trajectory] = field(default_factory=list)
-    loads: list[str] = field(default_factory=list)
-    """The load in each leg."""
-    tools: list[str] = field(default_factory=list)
-    """The tool in each leg."""
+    legs: list[PlanLeg] = field(default_factory=list)
     changes_tool: bool = False
     notes: list[str] = field(default_factory=list)
     frames: list[str] = field(default_factory=list)
@@ -92,8 +89,7 @@ class SequenceMotions:
         if isinstance(motion, SourceMotion):
             return motion
         if id(motion) not in self._motions:
-            name = motion.name if isinstance(motion, Job) else motion.job.name
-            self._motions[id(motion)] = SourceMotion(name, motion)
+            self._motions[id(motion)] = SourceMotion(motion.name, motion)
         return self._motions[id(motion)]
 
     def listed(self, angles: Angles) -> str:
@@ -178,9 +174,7 @@ class SequenceMotions:
             raise type(error)(f"{where}{error.problem}", error.hint) from error
 
     def _add(self, trajectory: Trajectory, holds: str) -> int:
-        self.legs.append(trajectory)
-        self.loads.append(holds)
-        self.tools.append(self.tool)
+        self.legs.append(PlanLeg(trajectory, holds, self.tool))
         return len(self.legs) - 1
 
     def same(self, one: Angles, other: Angles) -> bool:

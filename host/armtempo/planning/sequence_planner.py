@@ -10,19 +10,20 @@ from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.basics.progress import Progress
 from armtempo.model import steps as kinds
 from armtempo.model.arm import Arm
+from armtempo.model.leg import SequenceRow
+from armtempo.model.plan import Plan, check_size
 from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence
-from armtempo.model.sequence_plan import SequencePlan, SequenceRow, check_size
 from armtempo.model.steps import Step
 from armtempo.model.tool_pose import BASE, Pose
-from armtempo.planning import pallet_places, planner
-from armtempo.planning.pallet_places import Place
+from armtempo.planning import planner, via_points
 from armtempo.planning.sequence_motions import Angles, NamedAngles, SequenceMotions, to_angles
+from armtempo.planning.via_points import Place
 
 _THEN = {kinds.NEXT: record.NEXT_THEN, kinds.FAULT: record.FAULT_THEN}
 
 
-def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> SequencePlan:
+def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Plan:
     """All different motions of a sequence, and the rows that the board executes.
 
     Raises InputError, naming file and step, if a motion does not begin at the end of the one before, or the
@@ -37,19 +38,24 @@ def plan(arm: Arm, sequence: Sequence, progress: Progress | None = None) -> Sequ
     if not rows:
         raise InputError(f"{source}: the sequence has no effect", "add a step that moves, sets or waits")
     check_size(len(rows), len(motions.legs), len(compiler.counters), source)
-    legs = [replace(leg, name=f"{sequence.name}-{number}") for number, leg in enumerate(motions.legs, 1)]
-    return SequencePlan(
+    legs = [
+        replace(
+            leg,
+            trajectory=replace(leg.trajectory, name=f"{sequence.name}-{number}"),
+            tool=leg.tool if motions.changes_tool else "",
+        )
+        for number, leg in enumerate(motions.legs, 1)
+    ]
+    return Plan(
         arm,
         sequence.name,
         tuple(legs),
         tuple(rows),
-        tuple(compiler.counters),
         planner.versions(),
-        tuple(motions.loads),
         tuple(dict.fromkeys(motions.notes)),
         tuple(dict.fromkeys(motions.frames)),
-        tuple(motions.tools) if motions.changes_tool else (),
         tuple(dict.fromkeys(name for name, _ in compiler.places)),
+        tuple(compiler.counters),
     )
 
 
@@ -173,7 +179,7 @@ class _Compiler:
                 self.motions.frames.append(pallet.frame)
             key = step.pallet, self.motions.tool
             if key not in self.places:
-                self.places[key] = pallet_places.resolve(self.motions.arm, pallet)
+                self.places[key] = via_points.places(self.motions.arm, pallet)
         except ArmtempoError as error:
             raise type(error)(f"{step.where}repeat: {error.problem}", error.hint) from error
         return self.places[key]
@@ -229,7 +235,7 @@ class _Compiler:
         if to == here.angles_deg:
             return [], here
         number = self.motions.line(here.angles_deg, to, step.speed_mm_s, where)
-        leg = self.motions.legs[number]
+        leg = self.motions.legs[number].trajectory
         end = _End(to_angles(leg(leg.duration_s)) if isinstance(to, Pose) else to, name)
         return [_move(number, step.step, f"line to {name}")], end
 

@@ -10,8 +10,8 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.progress import Progress
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.leg import Search
 from armtempo.model.parts import Limits
-from armtempo.model.plan import Search
 from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.time_parameterization import Group, Timed
 from armtempo.splines import bspline

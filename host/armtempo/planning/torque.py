@@ -148,7 +148,7 @@ def plan_by_torque(arm: Arm, job: Job, progress: Progress | None = None) -> Plan
     factor, low, high = 1.0, 0.0, math.inf
     for number in range(_TRIES):
         found = planner.plan(_scaled(arm, factor), job, part(progress, number, _TRIES))
-        least = least_margin(found.holding, found.trajectory)
+        least = least_margin(*found.loaded_legs[0])
         if least is not None and least.margin < ENOUGH:
             high, short = factor, f"{least.joint}: {least.description}"
         elif best is not None and found.total_s > best.total_s * (1.0 - _PAYS):

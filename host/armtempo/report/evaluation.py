@@ -12,6 +12,7 @@ from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError, RunFolderError
 from armtempo.model.arm import Arm
 from armtempo.model.joint_unit import JointUnit
+from armtempo.model.leg import JobSolution
 from armtempo.model.parts import Limits
 from armtempo.model.plan import Plan
 from armtempo.report import analysis, peaks, replayed, run_reader
@@ -28,10 +29,7 @@ _NAMED = 3
 
 @dataclass(frozen=True)
 class LegEvaluation:
-    """A leg with its curves.
-
-    ``plan`` is None for a leg of a sequence, and if only the board had the motion; then ``arm`` may be None too.
-    """
+    """A leg with its curves."""
 
     number: int
     """From 1."""
@@ -40,8 +38,9 @@ class LegEvaluation:
     joints: tuple[JointScale, ...]
     trajectory: Trajectory
     arm: Arm | None
-    """With what the tool holds on this leg."""
-    plan: Plan | None
+    """With what the tool holds on this leg; None if it is not known."""
+    solution: JobSolution | None
+    """None for a leg of a sequence, and if only the board had the motion."""
     repetitions: tuple[RepetitionData, ...]
     """Its recorded runs that have samples."""
     ends_steps: tuple[tuple[int, ...], ...]
@@ -66,7 +65,7 @@ class LegEvaluation:
     @property
     def extremes(self) -> Sequence[extremes.Extremes]:
         """The planned motion's largest speed, acceleration and jerk of each joint."""
-        return self.plan.extremes if self.plan else extremes.of_joints(self.trajectory.joints)
+        return self.solution.extremes if self.solution else extremes.of_joints(self.trajectory.joints)
 
     @property
     def limit_checks(self) -> list[list[peaks.LimitCheck]]:
@@ -95,6 +94,8 @@ class Evaluation:
     """A run with those of its legs that have samples, and the problems of its files."""
 
     run: RunData
+    plan: Plan | None
+    """None if only the board had what was run."""
     legs: tuple[LegEvaluation, ...]
     complaints: tuple[str, ...]
 
@@ -111,7 +112,7 @@ def evaluate(folder: Path) -> Evaluation:
     """
     run = run_reader.load(folder)
     plan = replayed.plan_of(run)
-    legs = (plan.trajectory,) if plan else replayed.legs_of(run)
+    legs = replayed.legs_of(run, plan)
     for leg in legs:
         if len(run.joints) != len(leg.joints):
             raise RunFolderError(
@@ -122,19 +123,20 @@ def evaluate(folder: Path) -> Evaluation:
     if not any(recorded) and not any(repetition.rows for repetition in run.repetitions):
         raise RunFolderError(f"{folder}: contains no samples", "run it again")
     found = _complaints(run, legs, recorded)
-    arms = [plan.holding] if plan else _arms(run, found)
-    return Evaluation(run, tuple(_legs(run, legs, arms, plan, recorded)), tuple(found))
+    arms = _arms(run, plan, found)
+    return Evaluation(run, plan, tuple(_legs(run, legs, arms, plan, recorded)), tuple(found))
 
 
-def _arms(run: RunData, complaints: list[str]) -> Sequence[Arm | None]:
-    """The arm on each leg of a run without a motion's plan, if it is known and fits; otherwise adds a complaint."""
+def _arms(run: RunData, plan: Plan | None, complaints: list[str]) -> Sequence[Arm | None]:
+    """The arm on each leg, if it is known and fits; otherwise adds a complaint."""
+    if plan is not None:
+        return [arm for arm, _ in plan.loaded_legs]
     try:
-        arms = replayed.arms_of(run)
+        arm = replayed.arm_of(run)
     except InputError as error:
         complaints.append(error.problem)
-        arms = []
-    fit = len(arms) == len(run.legs) and all(len(arm.driven) == len(run.joints) for arm in arms)
-    return arms if fit else [None] * len(run.legs)
+        arm = None
+    return [arm if arm and len(arm.driven) == len(run.joints) else None] * len(run.legs)
 
 
 def _runs(
@@ -181,8 +183,9 @@ def _legs(
         if usable:
             words = next((row.words for row in run.rows if row.leg == index + 1), "")
             curves = analysis.curves(usable, leg)
+            solution = plan.legs[index].solution if plan else None
             yield LegEvaluation(
-                index + 1, words, run.joints, leg, arms[index], plan, tuple(usable), tuple(ends), curves
+                index + 1, words, run.joints, leg, arms[index], solution, tuple(usable), tuple(ends), curves
             )
 
 

@@ -10,14 +10,13 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import ArmtempoError, RunFolderError
-from armtempo.encoding import decode
+from armtempo.encoding import encode
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.joint_unit import DEG, JointUnit
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import SequencePlan
 from armtempo.report import run_folder
-from armtempo.report.run_folder import ARM, SEQUENCE
+from armtempo.report.run_folder import ARM
 from armtempo.report.run_reader import RESTORE, RepetitionData, RunData
 from armtempo.splines.trajectory import Trajectory
 
@@ -29,21 +28,33 @@ SPEED_NOTE = "of the planned speed"
 
 
 def plan_of(run: RunData) -> Plan | None:
-    """The plan of a motion; None if only the board had it. Raises InputError if its file is damaged."""
-    return Plan.load(run.trajectory_path) if run.trajectory_path else None
+    """The plan of what was run; None if only the board had it.
+
+    Raises InputError if its file is damaged, RunFolderError if it is that of another run.
+    """
+    path = run.plan_path
+    plan = Plan.load(path) if path else None
+    if plan and len(plan.legs) != len(run.legs):
+        raise RunFolderError(
+            f"{path} has {len(plan.legs)} motions, but the run {len(run.legs)}",
+            "put back the plan of this run",
+        )
+    return plan
 
 
-def legs_of(run: RunData) -> tuple[Trajectory, ...]:
-    """The motions from the board's records, to the rounding of their integers.
+def legs_of(run: RunData, plan: Plan | None) -> tuple[Trajectory, ...]:
+    """The motions as planned; without a plan from the board's records, to the rounding of their integers.
 
     Raises RunFolderError if a record is missing or damaged.
     """
+    if plan is not None:
+        return tuple(leg.trajectory for leg in plan.legs)
     return tuple(_leg(run.path / leg.file, leg.name, run) for leg in run.legs)
 
 
 def _leg(path: Path, name: str, run: RunData) -> Trajectory:
     try:
-        return decode.trajectory(path.read_bytes(), run_folder.transmission(run.joints), name)
+        return encode.decoded(path.read_bytes(), run_folder.transmission(run.joints), name)
     except OSError as error:
         raise RunFolderError(
             f"{path}: cannot be read ({os_reason(error)}), so the planned motion is not known", RESTORE
@@ -52,15 +63,10 @@ def _leg(path: Path, name: str, run: RunData) -> Trajectory:
         raise RunFolderError(f"{path}: {error.problem}", RESTORE) from error
 
 
-def arms_of(run: RunData) -> list[Arm]:
-    """The arm on each leg of a run without a motion's plan, with what the tool holds there; empty if it is not known.
-
-    Raises InputError if its file is damaged.
-    """
-    sequence, arm = run.path / SEQUENCE, run.path / ARM
-    if sequence.is_file():
-        return [loaded for loaded, _ in SequencePlan.load(sequence).loaded_legs]
-    return [arm_json.load(arm)] * len(run.legs) if arm.is_file() else []
+def arm_of(run: RunData) -> Arm | None:
+    """The arm of a run without a plan; None if it is not known. Raises InputError if its file is damaged."""
+    path = run.path / ARM
+    return arm_json.load(path) if path.is_file() else None
 
 
 @dataclass(frozen=True)

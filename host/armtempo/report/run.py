@@ -98,8 +98,7 @@ class Run:
 
     @cached_property
     def plan(self) -> Plan | None:
-        """The plan of a motion; None if it is not known, as for a motion that only the board had, and for a
-        sequence."""
+        """The plan, of a motion or a sequence; None if it is not known, as for one that only the board had."""
         return replayed.plan_of(self._content)
 
     @cached_property
@@ -108,7 +107,7 @@ class Run:
 
         Raises RunFolderError if one cannot be read.
         """
-        return (self.plan.trajectory,) if self.plan is not None else replayed.legs_of(self._content)
+        return replayed.legs_of(self._content, self.plan)
 
     @property
     def trajectory(self) -> Trajectory:

@@ -46,6 +46,8 @@ VERSION = 2
 META = "run.json"
 TRAJECTORY = "trajectory.json"
 SEQUENCE = "sequence.json"
+PLANS = TRAJECTORY, SEQUENCE
+"""The file of the plan: of a job, or of a sequence."""
 ARM = "arm.json"
 RUNNING, COMPLETE, INTERRUPTED, FAULT, BROKEN = "running", "complete", "interrupted", "fault", "broken"
 ROW_COLUMNS = {

@@ -22,7 +22,7 @@ from armtempo.model.transmission import coupling_problem
 from armtempo.report.run_folder import (
     FORMAT,
     META,
-    TRAJECTORY,
+    PLANS,
     VERSION,
     JointScale,
     Repetition,
@@ -120,10 +120,9 @@ class RunData:
     rows: tuple[RunRow, ...] = ()
 
     @property
-    def trajectory_path(self) -> Path | None:
+    def plan_path(self) -> Path | None:
         """The file of the plan, if there is one."""
-        path = self.path / TRAJECTORY
-        return path if path.is_file() else None
+        return next((path for name in PLANS if (path := self.path / name).is_file()), None)
 
 
 def load(path: Path) -> RunData:

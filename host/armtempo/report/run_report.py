@@ -14,7 +14,6 @@ from armtempo.model.arm import Arm
 from armtempo.planning import torque
 from armtempo.report import arm_picture, drawing, html_page, plots, sections
 from armtempo.report.evaluation import Evaluation, LegEvaluation, evaluate
-from armtempo.report.run_folder import SEQUENCE, TRAJECTORY
 from armtempo.splines.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -62,8 +61,8 @@ def figures(found: LegEvaluation) -> dict[str, tuple[Figure, str]]:
             f"{_what_is_seen(found)} minus planned angle: every repetition (pale) and their mean.",
         ),
     }
-    if found.plan and found.plan.searches:
-        searches = {_serves(names, search.joints): search for search in found.plan.searches}
+    if found.solution and found.solution.searches:
+        searches = {_serves(names, search.joints): search for search in found.solution.searches}
         polished_s = {name: search.total_s for name, search in searches.items() if search.optimum_s}
         end = "; where the gradient solver ended after it (dot)" if polished_s else ""
         drawn["convergence"] = (
@@ -118,40 +117,35 @@ def render(found: Evaluation, drawn: dict[str, tuple[Figure, str]]) -> str:
             sheet.heading(_HEADINGS[name])
         sheet.figure(drawing.inline_svg(figure, name, caption), caption)
         if name == "errors":
-            _planned(sheet, found.legs[0])
+            _planned(sheet, found)
     sections.course(sheet, found)
     _origin(sheet, found)
     return sheet.render()
 
 
-def _planned(sheet: html_page.Page, found: LegEvaluation) -> None:
+def _planned(sheet: html_page.Page, found: Evaluation) -> None:
     sheet.heading("The plan")
-    if found.plan:
+    if found.plan and found.legs[0].solution:
         sections.plan_extremes(sheet, found.plan)
         sections.plan_timing(sheet, found.plan)
         return
-    sheet.note(
-        f"How this motion was planned is not known: it was on the board, and is read back from its record. It lasts "
-        f"{found.trajectory.duration_s:.3f} s."
-    )
+    board = "it was on the board, and is read back from its record"
+    why = "the plan of a sequence keeps its motions alone" if found.plan else board
+    lasts_s = found.legs[0].trajectory.duration_s
+    sheet.note(f"How this motion was planned is not known: {why}. It lasts {lasts_s:.3f} s.")
 
 
 def _origin(sheet: html_page.Page, found: Evaluation) -> None:
     run = found.run
-    plan = found.legs[0].plan if found.single else None
     sheet.heading("How to repeat it")
-    there = [name for name in (TRAJECTORY, SEQUENCE) if (run.path / name).is_file()]
     repeat = "" if any(entry.rows for entry in run.entries) else f" --repeat {len(run.repetitions)}"
-    sheet.code(f"armtempo run {[*there, run.meta['name']][0]}{repeat}")
+    sheet.code(f"armtempo run {run.plan_path.name if run.plan_path else run.meta['name']}{repeat}")
     known: list[tuple[str, str]] = [
         (key, _flat(run.meta[key])) for key in ("port", "board") if key in run.meta
     ]
     if "virtual" in run.meta:
         known.append(("virtual board", "yes" if run.meta["virtual"] else "no"))
-    if plan:
-        sections.plan_origin(sheet, plan, known)
-    else:
-        sheet.table(("what", "value"), known)
+    sections.origin(sheet, found.plan, known)
 
 
 def _flat(value: object) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from armtempo.model.job import Job
 from armtempo.model.joint_unit import heads
 from armtempo.model.plan import Plan
 from armtempo.planning import checks, path_deviation
@@ -237,21 +238,22 @@ def plan_timing(sheet: html_page.Page, plan: Plan) -> None:
     )
 
 
-def plan_origin(sheet: html_page.Page, plan: Plan, others: Sequence[tuple[str, object]]) -> None:
-    """Settings and versions of the plan, and ``others`` of the run."""
-    job = plan.job
-    rows: list[tuple[str, object]] = [
+def origin(sheet: html_page.Page, plan: Plan | None, others: Sequence[tuple[str, str]]) -> None:
+    """Settings and versions of the plan, if it is known, and ``others`` of the run."""
+    rows = _settings(plan.job) if plan and not plan.is_sequence else []
+    if plan:
+        versions = plan.versions.items()
+        rows += [(name if name == "machine" else f"version of {name}", value) for name, value in versions]
+    sheet.table(("what", "value"), [*rows, *others])
+
+
+def _settings(job: Job) -> list[tuple[str, str]]:
+    return [
         ("path", job.path),
         ("optimiser", f"{job.optimiser}, population {job.population}, {job.iterations} iterations"),
-        ("seed", job.seed),
+        ("seed", str(job.seed)),
         ("degree, timing, refine", f"{job.degree}, {job.timing}, {job.refine}"),
-        *(
-            (name if name == "machine" else f"version of {name}", value)
-            for name, value in plan.versions.items()
-        ),
-        *others,
     ]
-    sheet.table(("what", "value"), [(name, str(value)) for name, value in rows])
 
 
 def _extremes_row(plan: Plan, joint: int) -> list[str]:

@@ -16,7 +16,8 @@ from armtempo.encoding import flash_use
 from armtempo.model.arm import Arm
 from armtempo.model.job import AUTO, GRADIENT
 from armtempo.model.joint_unit import DEG, MM, names
-from armtempo.model.plan import Plan, Search
+from armtempo.model.leg import Search
+from armtempo.model.plan import Plan
 from armtempo.planning import board_limits, checks, path_deviation, rest_to_rest, torque
 from armtempo.planning.free import free_plan
 from armtempo.planning.free.free_plan import Trial
@@ -54,7 +55,7 @@ def lines(plan: Plan, verbose: bool = False) -> list[str]:
     if job.timing == "per-joint" and len(plan.searches) > 1:
         text.extend(_separation(plan, verbose))
     text.extend(f"note: {note}" for note in plan.notes)
-    text.extend(torque_lines([(plan.holding, plan.trajectory)]))
+    text.extend(torque_lines(plan.loaded_legs))
     text.extend(
         f"{each.level.value}: {each.where}: {each.what}; {each.next_step}" for each in coarse_steps(plan.arm)
     )
@@ -225,7 +226,7 @@ def values(plan: Plan) -> dict[str, Any]:
         "record_bytes": record_bytes(plan),
         "joints": [_joint_values(plan, joint) for joint in range(len(plan.extremes))],
         "notes": list(plan.notes),
-        "torque": least._asdict() if (least := torque.least_margin(plan.holding, plan.trajectory)) else None,
+        "torque": least._asdict() if (least := torque.least_margin(*plan.loaded_legs[0])) else None,
     }
 
 

@@ -110,10 +110,10 @@ def posture_deg(client: Client, arm: Arm) -> Array:
 
     Raises LinkError if a position is unknown.
     """
-    return angles_deg(_known_status(client, arm), arm)
+    return angles_deg(known_status(client, arm), arm)
 
 
-def _known_status(client: Client, arm: Arm) -> Status:
+def known_status(client: Client, arm: Arm) -> Status:
     """The status; LinkError if a position is unknown."""
     status = client.status()
     known = known_joints(status, arm)
@@ -140,7 +140,12 @@ def angles_deg(status: Status, arm: Arm) -> Array:
 
 def is_at(client: Client, arm: Arm, target_deg: Array) -> bool:
     """Whether every motor is within half a step of ``target_deg`` (J,); raises LinkError if a position is unknown."""
-    status, gears = _known_status(client, arm), arm.transmission
+    return stands_at(known_status(client, arm), arm, target_deg)
+
+
+def stands_at(status: Status, arm: Arm, target_deg: Array) -> bool:
+    """As ``is_at``, by a ``known_status``."""
+    gears = arm.transmission
     if arm.coupling:  # several postures within the ranges may have the same whole steps
         off_steps = gears.steps(target_deg) - status.positions.commanded_steps
         return bool(np.all(np.abs(off_steps) <= _HALF_STEP))

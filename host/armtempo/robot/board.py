@@ -7,16 +7,14 @@ from contextlib import ExitStack, contextmanager
 from functools import wraps
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
-from armtempo.diagnosis.selftest.result import SelfTest
 from armtempo.link import Client
 from armtempo.link.board_messages import Hello, Status
 from armtempo.model.arm import Arm
-from armtempo.report.run import Run
 from armtempo.robot import board_state, kept_position
 from armtempo.robot.board_state import BoardState
 from armtempo.robot.connection import Connection
@@ -27,6 +25,10 @@ from armtempo.robot.programs import Programs
 from armtempo.robot.running import LOCK_S
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import BoardStore
+
+if TYPE_CHECKING:
+    from armtempo.diagnosis.selftest.result import SelfTest
+    from armtempo.report.run import Run
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -63,7 +65,7 @@ class Board:
         """Where the arm is."""
         self.io = BoardIO(self._shared)
         """Outputs and inputs."""
-        self.motions = Motions(self._shared, self.store)
+        self.motions = Motions(self._shared)
         """What moves the arm, and what it recorded."""
         self.programs = Programs(self._shared)
         """Users' programs."""

@@ -8,12 +8,11 @@ from pathlib import Path
 
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError
-from armtempo.encoding import encoded_sequence, planned_for
+from armtempo.encoding import made_with
 from armtempo.encoding.encode import arm_record
-from armtempo.encoding.encoded_sequence import Encoded
 from armtempo.link import Client
 from armtempo.model.arm import Arm
-from armtempo.model.sequence_plan import AnyPlan
+from armtempo.model.plan import Plan
 from armtempo.robot import arm_state, stop_request
 from armtempo.robot.goto import StartPosition
 from armtempo.robot.stop_request import StopRequest
@@ -41,22 +40,16 @@ class Connection:
         arm_state.configure(self.client, arm, replace)
         self.arm = arm
 
-    def configure_for(self, plan: AnyPlan) -> None:
-        """Set the board up for the arm of a plan, as ``configure``; InputError if a frame has changed since."""
-        if self.arm is None or arm_record(self.arm) != arm_record(plan.arm):
-            self.configure(plan.arm)
-            return
-        planned_for.check_surroundings(f"plan {plan.name!r}", plan, self.arm)
-        self.configure(self.arm)  # it may have postures and frames that the plan's arm has not
+    def configure_for(self, arm: Arm, plan: Plan | None) -> None:
+        """Set the board up for the arm of a motion or sequence, as ``configure``.
 
-    def encoded(self, what: AnyPlan | Encoded, name: str | None = None) -> Encoded:
-        """Encode a plan for the board, which is set up for its arm; ``name``: as ``encoded_sequence.encoded``."""
-        if not isinstance(what, AnyPlan):
-            self.configure(what.arm)
-            return what
-        found = encoded_sequence.encoded(what, name)
-        self.configure_for(what)
-        return found
+        Raises InputError if something that its ``plan`` was made with has changed since.
+        """
+        if plan is None or self.arm is None or arm_record(self.arm) != arm_record(arm):
+            self.configure(arm)
+            return
+        made_with.check_surroundings(f"plan {plan.name!r}", plan, self.arm)
+        self.configure(self.arm)  # it may have postures and frames that the plan's arm has not
 
     @contextmanager
     def stoppable(self, given: StopRequest | None) -> Iterator[StopRequest]:

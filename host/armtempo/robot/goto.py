@@ -3,37 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from armtempo_shared import limits, wire
+from armtempo_shared import limits
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion
-from armtempo.encoding.encoded_motion import MotionKey
-from armtempo.encoding.encoded_sequence import Encoded
+from armtempo.encoding import encoded_plan
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link import Client
 from armtempo.link.board_messages import Sample
 from armtempo.link.follow import Followed, MotionFollower
 from armtempo.model.arm import Arm
-from armtempo.model.sequence_plan import AnyPlan, load_plan
-from armtempo.planning import point_to_point, via_points, workspace_check
+from armtempo.model.plan import Plan
+from armtempo.planning import point_to_point, workspace_check
 from armtempo.ports.names import is_sim
-from armtempo.robot import arm_state
-from armtempo.robot.running import attended, follow, nothing, put_once, raise_fault
+from armtempo.robot import arm_state, running
+from armtempo.robot.running import attended, follow, nothing, raise_failure
 from armtempo.robot.stop_request import StopRequest
 from armtempo.splines.trajectory import Trajectory
 
-Where = AnyPlan | Encoded | Path | str | ArrayLike
+Where = Plan | Encoded | Path | str | ArrayLike
 """A posture: its name in the arm file, the driven joints' angles in degrees (J,), or the start of a motion
 (or of its file) or sequence."""
 _NAME = "goto"
-_STORED = "tmp-goto"
-"""Name on the board of a move that is larger than its memory."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +55,11 @@ def go_to(
     Raises LinkError if the position is unknown, BoardError if the board refuses or a fault ends the move,
     PlanError if the arm would leave its workspace, or the tool cannot reach it in a straight line.
     """
-    if not arm_state.is_at(client, arm, target_deg):
-        here = arm_state.posture_deg(client, arm)
+    status = arm_state.known_status(client, arm)
+    if not arm_state.stands_at(status, arm, target_deg):
+        here = arm_state.angles_deg(status, arm)
         trajectory = motion(arm, here, target_deg, pace or MovePace())
-        data = encoded_motion.of_trajectory(trajectory, arm).data
+        data = encoded_plan.of_trajectory(trajectory, arm).data
         move_once(client, data, stop, _shown(progress, trajectory.duration_s))
 
 
@@ -85,24 +82,10 @@ def motion(arm: Arm, here_deg: Array, target_deg: Array, pace: MovePace) -> Traj
 def move_once(
     client: Client, data: bytes, stop: StopRequest, take: Callable[[Followed], object] = nothing
 ) -> None:
-    """Run a motion record once, from the board's memory; raises BoardError if a fault ends it.
-
-    One that is larger than that is stored and removed again.
-    """
-    stored = len(data) > client.info.once_bytes
-    if stored:
-        client.upload(_STORED, data)
-        key = MotionKey(_STORED, wire.record_crc(data))
-    else:
-        key = put_once(client, data)
-    try:
-        with attended(client, stop):
-            end = follow(client, stop, MotionFollower(client, client.start(key.name, key.crc)), take).end
-    finally:
-        if stored:
-            with suppress(LinkError):  # do not hide the earlier error
-                client.remove(_STORED)
-    raise_fault(end)
+    """Run a motion record once; raises BoardError if a fault ends it."""
+    with running.on_board(client, data) as key, attended(client, stop):
+        end = follow(client, stop, MotionFollower(client, client.start(key.name, key.crc)), take).end
+    raise_failure(client, end)
 
 
 def _shown(progress: Progress | None, duration_s: float) -> Callable[[Followed], object]:
@@ -149,10 +132,12 @@ def posture_deg(where: Where, arm: Arm) -> Array:
     Raises InputError for an unknown name, or a posture that does not fit the arm.
     """
     if isinstance(where, Path) or (isinstance(where, str) and where.endswith(".json")):
-        where = load_plan(where)
-    if isinstance(where, AnyPlan | Encoded):
+        where = Plan.load(where)
+    if isinstance(where, Plan | Encoded):
         start_deg = where.arm.home_deg if where.start_deg is None else where.start_deg
         return point_to_point.posture(start_deg, where.arm)
     if isinstance(where, str):
+        from armtempo.planning import via_points  # here, because angles need no inverse kinematics
+
         return via_points.posture_deg(arm, arm.posture(where))
     return point_to_point.posture(where, arm)

@@ -9,15 +9,15 @@ motors are declared, and the joints move home, when the angles of all coupled jo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
-from armtempo_shared.homing import ELSEWHERE, HELD, MISSED, Homing
-from armtempo_shared.messages import START_HOMING, START_SWITCHES_BIT
+from armtempo_shared.homing import ON_THE_WAY, Homing
+from armtempo_shared.messages import START_HOMING, START_SEEKS, START_SWITCHES_BIT
 
 from armtempo.basics.errors import InputError, LinkError
-from armtempo.encoding import encoded_motion
+from armtempo.encoding import encoded_plan
 from armtempo.link import Client
 from armtempo.link.follow import MotionFollower
 from armtempo.model import home_switches
@@ -26,7 +26,7 @@ from armtempo.model.home_switches import HomeSwitch
 from armtempo.model.parts import Limits
 from armtempo.planning import point_to_point
 from armtempo.robot import arm_state
-from armtempo.robot.running import attended, follow, put_once, raise_fault
+from armtempo.robot.running import attended, follow, on_board, raise_failure
 from armtempo.robot.stop_request import StopRequest
 
 HomingProgress = Callable[[str, int, int], object]
@@ -111,14 +111,15 @@ class _GroupHoming(Homing):
         found_deg: dict[int, float],
         told: _Told,
     ) -> None:
-        super().__init__(switch.row(index) for index, switch in switches.items())
+        rows = [switch.row(index) for index, switch in switches.items()]
+        super().__init__(rows, home_switches.names(arm), [1.0] * len(arm.driven))
         self._client, self._arm, self._stop = client, arm, stop
         self._switches, self._found_deg, self._told = switches, found_deg, told
         self._ends_deg: dict[int, float] = {}
 
     def run(self) -> None:
         """Find the switches, declare the positions, and move the joints home."""
-        self._told(f"{self._names(self._switches)}: on the way to the switch")
+        self._told(f"{self._format_names(self._switches)}: on the way to the switch")
         self.find()
         for index, switch in self._switches.items():
             self._found_deg[index] = switch.trip_deg - switch.side * switch.away_deg
@@ -127,42 +128,19 @@ class _GroupHoming(Homing):
         if found:
             self._declare(found)
             self._go_home(found)
-            self._told(f"{self._names(found)}: at home", len(found))
+            self._told(f"{self._format_names(found)}: at home", len(found))
 
     def seen(self, lengths: dict[int, int | float]) -> None:
         """Tell it."""
         for index, length_deg in lengths.items():
             sign = self._arm.driven[index].unit.sign
-            self._told(f"{self._names([index])}: switch seen after {length_deg:.1f}{sign}; once more, slowly")
+            self._told(
+                f"{self._format_names([index])}: switch seen after {length_deg:.1f}{sign}; once more, slowly"
+            )
 
-    def failure(self, kind: int, joints: Sequence[int], length: int | float) -> LinkError:
-        """With what to do."""
-        names, unit = self._names(joints), self._arm.driven[joints[0]].unit.word
-        if kind == MISSED:
-            return LinkError(
-                f"{names}: no limit switch tripped within {length:.0f} {unit}, its range and a margin",
-                "check its wiring, its pin, its level ('active') and at which end it is in the arm file, its motor's "
-                "direction, and where the joint stands",
-            )
-        if kind == HELD:
-            return LinkError(
-                f"{names}: a switch of another joint stops it", "check the wiring of the switches"
-            )
-        if kind == ELSEWHERE:
-            return LinkError(
-                f"{names}: its limit switch tripped {length:.2f} {unit} after it had been left by "
-                f"{home_switches.BACK_DEG:g}",
-                "check its wiring and that it sits firmly",
-            )
-        levels = ", ".join(f'active = "{self._arm.driven[index].switches.active}"' for index in joints)
-        others = ", ".join(home_switches.sharing(self._arm, joints))
-        shared = f"; or {others}, whose switch is on the same input, stands on it" if others else ""
-        return LinkError(
-            f"{names}: its limit switch is still pressed {home_switches.MOST_PRESSED_DEG:g} {unit} away from where it "
-            "tripped",
-            f"its level is probably inverted: the arm file has {levels}; or it is stuck, or wired to another "
-            f"pin{shared}",
-        )
+    def error(self, problem: str, hint: str) -> LinkError:
+        """As the failure of a link: nobody but the user can mend it."""
+        return LinkError(problem, hint)
 
     def stands(self, joint: int) -> float:
         """After the last motion, in which it moved."""
@@ -185,15 +163,18 @@ class _GroupHoming(Homing):
             if abs(self.stands(index) - home_deg[index]) > home_switches.TOLERANCE_DEG
         ]
         if stopped:
-            raise LinkError(
-                f"{self._names(stopped)}: a switch tripped on the way to its home posture",
-                f"check {self._arm.driven[stopped[0]].unit.key('home_deg')} and the switches in the arm file",
-            )
+            raise self.failure(ON_THE_WAY, stopped)
 
-    def _names(self, joints: Iterable[int]) -> str:
+    def _format_names(self, joints: Iterable[int]) -> str:
         return ", ".join(self._arm.driven[index].name for index in joints)
 
-    def move(self, starts: dict[int, int | float], ends: dict[int, int | float], is_slow: bool) -> int:
+    def move(
+        self,
+        starts: dict[int, int | float],
+        ends: dict[int, int | float],
+        is_slow: bool,
+        seeks: bool = False,
+    ) -> int:
         """See ``Homing``; at a fraction of the joints' limits."""
         start_deg = self._posture_deg()
         end_deg = list(start_deg)
@@ -201,13 +182,13 @@ class _GroupHoming(Homing):
             start_deg[index], end_deg[index] = starts[index], ends[index]
         slow_arm = _slowed(self._arm, home_switches.SLOW if is_slow else home_switches.FAST)
         trajectory = point_to_point.straight("home", start_deg, end_deg, slow_arm)
-        motion = encoded_motion.of_trajectory(trajectory, self._arm)
-        key, flags = put_once(self._client, motion.data), self._flags(starts)
-        with attended(self._client, self._stop):
+        motion = encoded_plan.of_trajectory(trajectory, self._arm)
+        flags = self._flags(starts) | START_SEEKS * seeks
+        with on_board(self._client, motion.data) as key, attended(self._client, self._stop):
             follower = MotionFollower(self._client, self._client.start(key.name, key.crc, flags))
             end = follow(self._client, self._stop, follower).end
         tripped = self._client.status().fault_joint
-        raise_fault(end)
+        raise_failure(self._client, end)
         self._stop.check()
         ends_deg = self._arm.transmission.angles_of_steps(end.positions.commanded_steps)
         self._ends_deg = {index: float(ends_deg[index]) for index in starts}

@@ -14,7 +14,6 @@ from armtempo_shared.messages import START_HELD
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import BoardError, LinkError
 from armtempo.encoding import encode
-from armtempo.encoding.encoded_motion import EncodedMotion
 from armtempo.link import Client
 from armtempo.link.board_messages import Done, Event, Fault, Positions, Sample
 from armtempo.link.refusal import refusal
@@ -62,13 +61,12 @@ def step(client: Client, arm: Arm, move: JogMove, speed: float, stop: StopReques
     Raises BoardError if the board refuses or a fault ends it; otherwise as ``plan``.
     """
     motion = plan(client, arm, move, speed)
-    goto.move_once(client, _encoded(motion, arm).data, stop)
+    goto.move_once(client, _record(motion, arm), stop)
     return motion
 
 
-def _encoded(motion: JogMotion, arm: Arm) -> EncodedMotion:
-    data = encode.motion_record(motion.trajectory, arm, motion.brakes)
-    return EncodedMotion(motion.trajectory.name, arm, motion.trajectory, data)
+def _record(motion: JogMotion, arm: Arm) -> bytes:
+    return encode.motion_record(motion.trajectory, arm, motion.brakes)
 
 
 class HeldJog:
@@ -98,9 +96,8 @@ class HeldJog:
         """Upload and start it; raises BoardError if the board refuses."""
         client = self._client
         client.need("jog", "moving by hand")
-        encoded = _encoded(self.motion, self.arm)
-        key = running.put_once(client, encoded.data)
         with ExitStack() as ends:
+            key = ends.enter_context(running.on_board(client, _record(self.motion, self.arm)))
             # Nothing holds the jog while a broken port is waited for
             ends.enter_context(client.session.on_loss(OnLoss(retry_s=0.0)))
             self._run = client.start(key.name, key.crc, START_HELD)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import ExitStack
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from armtempo_shared.messages import RESUME
 
@@ -13,17 +13,13 @@ from armtempo.basics.arguments import checked_as
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion, encoded_sequence, made_with
-from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
-from armtempo.encoding.encoded_sequence import Encoded, EncodedSequence
+from armtempo.encoding import encoded_plan, made_with
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link.board_messages import SequenceState
-from armtempo.link.follow import MotionFollower, SequenceFollower, SequenceWatcher
+from armtempo.link.follow import MotionFollower, RunEnd, SequenceFollower, SequenceWatcher
 from armtempo.model.plan import Plan
-from armtempo.model.sequence_plan import AnyPlan, SequencePlan, load_plan
 from armtempo.model.tool_pose import Pose
-from armtempo.planning import via_points
 from armtempo.planning.jog.jog_motion import SPEED, by_of_joint, move_of, number_of_joint
-from armtempo.report.run import Run
 from armtempo.report.run_folder import RunFolder
 from armtempo.robot import arm_state, goto, jog, recording, running
 from armtempo.robot.by_hand import HandGuided
@@ -31,9 +27,12 @@ from armtempo.robot.connection import Connection
 from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.recording import Watcher
-from armtempo.robot.speed import change_speed, permille
+from armtempo.robot.running import change_speed, permille
 from armtempo.robot.stop_request import StopRequest
-from armtempo.robot.store import BoardStore, store, stored_name
+from armtempo.robot.store import store, stored_name
+
+if TYPE_CHECKING:
+    from armtempo.report.run import Run
 
 MOST_REPETITIONS = 99
 """Their files are numbered with two digits."""
@@ -43,9 +42,8 @@ MOST_REPETITIONS = 99
 class Motions:
     """``Board.motions``: what moves the arm, and what it recorded."""
 
-    def __init__(self, board: Connection, store: BoardStore) -> None:
+    def __init__(self, board: Connection) -> None:
         self._board = board
-        self._store = store
         self.last_jog_ends = ""
         """Why the last jog ended early; "" if it did not."""
         self._last_folder: Path | None = None
@@ -73,6 +71,10 @@ class Motions:
         with self._board.stoppable(stop) as wanted:
             self._board.start.home_virtual_arm(arm)
             if isinstance(where, Pose):
+                from armtempo.planning import (
+                    via_points,  # here, because a posture needs no inverse kinematics
+                )
+
                 target_deg = via_points.nearest(arm, where, self._posture_deg().tolist())
             assert target_deg is not None
             goto.go_to(self._board.client, arm, target_deg, wanted, progress, goto.MovePace(speed, line))
@@ -162,7 +164,7 @@ class Motions:
 
     def run(
         self,
-        motion: AnyPlan | Encoded | Path | str,
+        motion: Plan | Encoded | Path | str,
         repeat: int = 1,
         out: Path | str = "runs",
         progress: Progress | None = None,
@@ -182,52 +184,18 @@ class Motions:
         """
         if not 1 <= repeat <= MOST_REPETITIONS:
             raise InputError(f"repeat: {repeat} is not in the range 1<=x<={MOST_REPETITIONS}", "change it")
-        if isinstance(motion, Path) or (isinstance(motion, str) and motion.endswith(".json")):
-            motion = load_plan(motion)
-        if self._is_sequence(motion) if isinstance(motion, str) else motion.is_sequence:
-            if repeat != 1 or progress is not None:
-                raise InputError(
-                    "run: a sequence takes no repeat or progress", "leave them out; its steps repeat it"
-                )
-            self._run_sequence(motion, lambda _: None, stop, False, out, watcher or Watcher())
-            return Run.load(cast(Path, self._last_folder))
-        encoded = self._motion(motion)
-        if isinstance(motion, str):
-            made_with.check_stored(motion, encoded.data, encoded.arm)
+        encoded = self._encoded(motion)
+        if encoded.is_sequence and (repeat != 1 or progress is not None):
+            raise InputError(
+                "run: a sequence takes no repeat or progress", "leave them out; its steps repeat it"
+            )
         seen = recording.ProgressWatcher(progress, repeat, watcher or Watcher())
-        with self._board.stoppable(stop) as wanted:
-            store(self._board.client, encoded.records)
-            self._take_start(encoded, wanted)
-            folder = self._new_folder(encoded, Path(out))
-            seen.begin(encoded, folder)
-            self._repeat(encoded, folder, repeat, wanted, seen)
-        return Run.load(folder.path)
-
-    def _repeat(
-        self, encoded: EncodedMotion, folder: RunFolder, times: int, stop: StopRequest, watcher: Watcher
-    ) -> None:
-        """Replay a motion so often, and backwards in between, until a stop is wanted; raises BoardError at a fault."""
-        client, key = self._board.client, encoded.key
-        back = encoded_motion.way_back(encoded) if times > 1 else b""
-        for number in range(times):
-            if number:
-                goto.move_once(client, back, stop)
-            if stop.wanted:
-                return
-            with recording.repetition(client, encoded, folder, watcher) as recorder:
-                with running.attended(client, stop):
-                    follower = MotionFollower(client, client.start(key.name, key.crc))
-                    running.follow(client, stop, follower, recorder.take)
-                recorder.end(follower.end, stop.wanted)
-            running.raise_fault(follower.end)
-
-    def _is_sequence(self, name: str) -> bool:
-        found = self._board.client.find(stored_name(name))
-        return found is not None and found.sequence
+        self._run(encoded, repeat, Path(out), seen, stop)
+        return _load(cast(Path, self._last_folder))
 
     def run_sequence(
         self,
-        sequence: SequencePlan | EncodedSequence | str,
+        sequence: Plan | Encoded | str,
         watcher: SequenceWatcher = lambda _: None,
         stop: StopRequest | None = None,
         replace: bool = False,
@@ -241,53 +209,61 @@ class Motions:
         the sequence ends as ``timed_out`` or raises BoardError, as its step says. After Stopped,
         ``client.sequence()`` has the last state.
         """
-        return self._run_sequence(sequence, watcher, stop, replace, out, Watcher())
+        encoded = self._encoded(sequence)
+        if not encoded.is_sequence:
+            raise InputError(f"{encoded.name!r} is a motion, not a sequence", "run it with 'run'")
+        seen = recording.StateWatcher(watcher)
+        return cast(
+            SequenceState, self._run(encoded, 1, None if out is None else Path(out), seen, stop, replace)
+        )
 
-    def _run_sequence(
+    def _run(
         self,
-        sequence: AnyPlan | Encoded | str,
-        on_state: SequenceWatcher,
-        stop: StopRequest | None,
-        replace: bool,
-        out: Path | str | None,
+        encoded: Encoded,
+        repeat: int,
+        out: Path | None,
         watcher: Watcher,
-    ) -> SequenceState:
-        client = self._board.client
+        stop: StopRequest | None,
+        replace: bool = False,
+    ) -> RunEnd | SequenceState:
+        """Store and run it so often, backwards in between; returns how the last time ended.
+
+        ``out``: recorded in a new run folder there; None: not recorded. Raises BoardError at a fault.
+        """
+        client, key = self._board.client, encoded.key
+        self._board.configure_for(encoded.arm, encoded.plan)
+        if encoded.plan is None:
+            made_with.check_stored(encoded.name, encoded.data, encoded.arm)
         with self._board.stoppable(stop) as wanted:
-            if isinstance(sequence, str):
-                key = self._stored_sequence(sequence)
-            else:
-                encoded = self._store.upload(sequence, replace=replace)
-                key = encoded.key
-                self._take_start(encoded, wanted)
-
-            recorder = None
-            with ExitStack() as recorded:
-                if out is not None:
-                    if isinstance(sequence, str):
-                        encoded = encoded_sequence.of_board(sequence, self._board.known_arm(), client.fetch)
-                    folder = self._new_folder(encoded, Path(out))
-                    self._last_sequence = folder.path
-                    watcher.begin(encoded, folder)
-                    recorder = recorded.enter_context(recording.repetition(client, encoded, folder, watcher))
-                with running.attended(client, wanted):
-                    before = client.start(key.name, key.crc)
-                    follower = SequenceFollower(client, key.name, before, on_state)
-                    running.follow(client, wanted, follower, recorder.take if recorder else running.nothing)
-                if recorder:
-                    recorder.end_rows(follower)
-            running.raise_sequence_failure(client, follower.end)
-            return follower.end
-
-    def _stored_sequence(self, name: str) -> MotionKey:
-        """The key of a sequence on the board; a virtual arm is at home."""
-        found = self._board.client.find(stored_name(name))
-        if found is None or not found.sequence:
-            raise InputError(f"the board has no sequence {name!r}", "see 'armtempo list'")
-        if self._board.arm is not None:
-            made_with.check_stored(name, self._board.client.fetch(name), self._board.arm)
-            self._board.start.home_virtual_arm(self._board.arm)
-        return MotionKey(found.name, found.crc)
+            store(client, encoded.records, replace=replace)
+            self._take_start(encoded, wanted)
+            folder = None if out is None else self._new_folder(encoded, out)
+            if folder is not None:
+                watcher.begin(encoded, folder)
+            back = encoded_plan.way_back(encoded) if repeat > 1 else b""
+            for number in range(repeat):
+                if number:
+                    goto.move_once(client, back, wanted)
+                wanted.check()
+                recorder = None
+                with ExitStack() as recorded:
+                    if folder is not None:
+                        repetition = recording.repetition(client, encoded, folder, watcher)
+                        recorder = recorded.enter_context(repetition)
+                    with running.attended(client, wanted):
+                        run = client.start(key.name, key.crc)
+                        follower: MotionFollower | SequenceFollower = (
+                            SequenceFollower(client, key.name, run, watcher.on_state)
+                            if encoded.is_sequence
+                            else MotionFollower(client, run)
+                        )
+                        running.follow(
+                            client, wanted, follower, recorder.take if recorder else running.nothing
+                        )
+                    if recorder:
+                        recorder.end(follower.end, follower.lost, wanted.wanted)
+                running.raise_failure(client, follower.end)
+        return follower.end
 
     def _take_start(self, encoded: Encoded, stop: StopRequest) -> None:
         """Move a virtual arm to its start; raises LinkError if a real arm is not there."""
@@ -297,32 +273,40 @@ class Motions:
         self._board.start.take(encoded.arm, encoded.start_deg, name, advice, stop)
 
     def _new_folder(self, encoded: Encoded, out: Path) -> RunFolder:
-        """A new run folder in ``out``, that of ``last_run``."""
+        """A new run folder in ``out``, that of ``last_run`` and, of a sequence, of ``last_sequence``."""
         folder = recording.new_run(out, encoded, self._board.port, self._board.client)
         self._last_folder = folder.path
+        if encoded.is_sequence:
+            self._last_sequence = folder.path
         return folder
 
     @property
     def last_run(self) -> Run | None:
         """The last run that this object recorded, of a motion or a sequence, even if it ended early; None before the
         first."""
-        return Run.load(self._last_folder) if self._last_folder else None
+        return _load(self._last_folder) if self._last_folder else None
 
     @property
     def last_sequence(self) -> Run | None:
         """The last sequence that this object recorded, even if it ended early; None before the first."""
-        return Run.load(self._last_sequence) if self._last_sequence else None
+        return _load(self._last_sequence) if self._last_sequence else None
 
-    def fetch(self, motion: Plan | EncodedMotion | Path | str | None = None, out: Path | str = "runs") -> Run:
+    def fetch(self, motion: Plan | Encoded | Path | str | None = None, out: Path | str = "runs") -> Run:
         """Write the samples that the board kept of its last run into a new run folder in ``out``.
 
         ``motion``: the motion of that run; None: the motion that the button starts. Waits for the end of a
         run that is still in progress. Raises LinkError if the board has no samples.
         """
-        encoded = self._motion(self._default() if motion is None else motion)
+        encoded = self._encoded(self._default() if motion is None else motion)
+        if encoded.is_sequence:
+            raise InputError(
+                f"{encoded.name!r} is a sequence, not a motion",
+                "record it with 'armtempo run' or run_sequence",
+            )
+        self._board.configure_for(encoded.arm, encoded.plan)
         folder = recording.fetch(self._board.client, encoded, Path(out), self._board.port)
         self._last_folder = folder.path
-        return Run.load(folder.path)
+        return _load(folder.path)
 
     def stop(self, now: bool = False) -> None:
         """Brake along the path (``now``: freeze the outputs), and wait until the arm is at rest.
@@ -357,19 +341,11 @@ class Motions:
         """Continue along the path at the speed before the pause; raises BoardError if nothing moves."""
         change_speed(self._board.client, RESUME)
 
-    def _motion(self, what: AnyPlan | Encoded | Path | str) -> EncodedMotion:
-        """The motion for a board that is set up for its arm."""
-        plan = (
-            load_plan(what)
-            if isinstance(what, Path) or (isinstance(what, str) and what.endswith(".json"))
-            else what
-        )
-        found = self._store.read(plan) if isinstance(plan, str) else self._board.encoded(plan)
-        if found.is_sequence:
-            raise InputError(
-                f"{what} is a sequence, not a motion", "record it with 'armtempo run' or run_sequence"
-            )
-        return found
+    def _encoded(self, what: Plan | Encoded | Path | str) -> Encoded:
+        """What a plan, its file or a name on the board stands for."""
+        if isinstance(what, str) and not what.endswith(".json"):
+            return encoded_plan.of_board(stored_name(what), self._board.known_arm(), self._board.client.fetch)
+        return encoded_plan.of_any(what)
 
     def _default(self) -> str:
         for entry in self._board.client.stored():
@@ -382,3 +358,9 @@ class Motions:
 
     def _posture_deg(self) -> Array:
         return arm_state.posture_deg(self._board.client, self._board.known_arm())
+
+
+def _load(folder: Path) -> Run:
+    from armtempo.report.run import Run  # here, because moves read no run folder
+
+    return Run.load(folder)

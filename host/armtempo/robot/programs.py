@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from armtempo_shared.program import SUFFIX
 
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_program, made_with
-from armtempo.encoding.encoded_motion import MotionKey
-from armtempo.encoding.encoded_program import EncodedProgram
+from armtempo.encoding import made_with
+from armtempo.encoding.encoded_plan import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import Notice, SequenceState
 from armtempo.link.follow import Followed, SequenceFollower, SequenceWatcher
 from armtempo.model.arm import Arm
 from armtempo.model.job import is_name
 from armtempo.model.parts import PROGRAM
-from armtempo.model.user_program import UserProgram
 from armtempo.robot import running
 from armtempo.robot.connection import Connection
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import store
+
+if TYPE_CHECKING:  # imported where they are used, because they load the inverse kinematics
+    from armtempo.encoding.encoded_program import EncodedProgram
+    from armtempo.model.user_program import UserProgram
+
+    AnyProgram = EncodedProgram | UserProgram | Path | str
 
 Listener = Callable[[str], object]
 """Called with each line that a program prints, and with the traceback of a failure."""
@@ -58,11 +64,18 @@ class Programs:
     def __init__(self, board: Connection) -> None:
         self._board = board
 
-    def encode(self, program: UserProgram | Path | str, arm: Arm | Path | str) -> EncodedProgram:
+    def encode(self, program: AnyProgram, arm: Arm | Path | str) -> EncodedProgram:
         """The program of a file for this board, with the motions that it names: NAME.json beside it, or stored ones.
 
         Raises InputError for one that is neither, and as ``UserProgram.load``.
         """
+        from armtempo.encoding import encoded_program
+        from armtempo.model.user_program import UserProgram
+
+        if not isinstance(program, UserProgram | Path | str):
+            raise InputError(
+                f"Board.encode_program: program is {reprlib.repr(program)}", "give its file, or a UserProgram"
+            )
         arm = Arm.of(arm)
         found = program if isinstance(program, UserProgram) else UserProgram.load(program, arm)
         motions = encoded_program.motions_beside(found, arm)
@@ -82,7 +95,7 @@ class Programs:
 
     def upload(
         self,
-        program: EncodedProgram | UserProgram | Path | str,
+        program: AnyProgram,
         progress: Progress | None = None,
         replace: bool = False,
         default: bool = False,
@@ -93,6 +106,8 @@ class Programs:
         Raises InputError for what is wrong in it, LinkError if the board has too little memory, or something else
         under one of the names.
         """
+        from armtempo.encoding.encoded_program import EncodedProgram
+
         if not isinstance(program, EncodedProgram):
             program = self.encode(program, self._board.known_arm())
         if default:
@@ -109,6 +124,8 @@ class Programs:
         arm, client = self._board.arm, self._board.client
         if arm is None:
             return
+        from armtempo.encoding import encoded_program
+
         data = client.fetch(name)
         encoded_program.check_stored(name, data, arm)
         kept = [entry.name for entry in client.stored()]
@@ -118,7 +135,7 @@ class Programs:
 
     def run(
         self,
-        program: EncodedProgram | UserProgram | Path | str,
+        program: AnyProgram,
         listener: Listener = lambda _: None,
         watcher: SequenceWatcher = lambda _: None,
         stop: StopRequest | None = None,

@@ -13,13 +13,12 @@ from armtempo_shared.sequence import MOVE
 
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding.encoded_motion import EncodedMotion
-from armtempo.encoding.encoded_sequence import Encoded
+from armtempo.encoding.encoded_plan import Encoded
 from armtempo.link import Client
-from armtempo.link.board_messages import RowBegun, Sample
-from armtempo.link.follow import Followed, MotionFollower, RunEnd, SequenceFollower, number_in_run
+from armtempo.link.board_messages import RowBegun, Sample, SequenceState
+from armtempo.link.follow import Followed, Gap, MotionFollower, RunEnd, SequenceWatcher, number_in_run
 from armtempo.model import arm_json
-from armtempo.model.sequence_plan import SequenceRow
+from armtempo.model.leg import SequenceRow
 from armtempo.report import run_folder
 from armtempo.report.run_folder import (
     COMPLETE,
@@ -45,8 +44,21 @@ class Watcher:
     def on_sample(self, sample: Sample, duration_s: float) -> None:
         """A sample of a motion of ``duration_s`` has arrived; NaN for a motion of a sequence that was not reported."""
 
+    def on_state(self, state: SequenceState) -> None:
+        """The state of a sequence has changed."""
+
     def end(self, repetition: Repetition) -> None:
         """A repetition has ended, also by a stop or a fault."""
+
+
+class StateWatcher(Watcher):
+    """Calls a function with each state of a sequence."""
+
+    def __init__(self, call: SequenceWatcher) -> None:
+        self._call = call
+
+    def on_state(self, state: SequenceState) -> None:
+        self._call(state)
 
 
 class ProgressWatcher(Watcher):
@@ -67,6 +79,9 @@ class ProgressWatcher(Watcher):
             self._progress(self._ended * duration_s + done_s, self._repetitions * duration_s)
         self._inner.on_sample(sample, duration_s)
 
+    def on_state(self, state: SequenceState) -> None:
+        self._inner.on_state(state)
+
     def end(self, repetition: Repetition) -> None:
         self._ended += 1
         self._inner.end(repetition)
@@ -76,16 +91,15 @@ def new_run(parent: Path, encoded: Encoded, port: str, client: Client) -> RunFol
     """A new run folder with everything that is needed to repeat the run."""
     name, arm, plan = encoded.name, encoded.arm, encoded.plan
     where = {"arm": arm.name, "port": port, "virtual": client.info.virtual, "board": vars(client.info)}
-    legs = tuple((motion.name, motion.data) for motion in encoded.motions)
     rows = tuple(map(_row, encoded.rows))
     with run_folder.new_folder(parent, name) as path:
-        names = tuple(leg for leg, _ in legs)
+        names = tuple(leg.name for leg in encoded.legs)
         folder = RunFolder(path, name, run_folder.scales(arm), where, legs=names, rows=rows)
-        folder.write_legs(data for _, data in legs)
+        folder.write_legs(leg.data for leg in encoded.legs)
         if plan is None:
             arm_json.save(arm, path / run_folder.ARM)
         else:
-            plan.save(path / (run_folder.SEQUENCE if encoded.is_sequence else run_folder.TRAJECTORY))
+            plan.save(path / (run_folder.SEQUENCE if plan.is_sequence else run_folder.TRAJECTORY))
         folder.write()
     return folder
 
@@ -105,7 +119,7 @@ class Recorder:
         self._file = file
         self._watcher = watcher
         self._sequence = encoded.is_sequence
-        self._legs_s = [math.nan, *(motion.trajectory.duration_s for motion in encoded.motions)]
+        self._legs_s = [math.nan, *(leg.trajectory.duration_s for leg in encoded.legs)]
         self._begun_s = client.session.clock()
         self._row_of_run: dict[int, int] = {}  # of each run that was reported and may have more samples
 
@@ -122,32 +136,30 @@ class Recorder:
             for run in [run for run in self._row_of_run if run < event.run]:
                 del self._row_of_run[run]
 
-    def end(self, end: RunEnd, stopped: bool) -> None:
-        """A motion has ended; ``stopped``: a stop was wanted."""
+    def end(self, end: RunEnd | SequenceState, lost: tuple[Gap, ...], stopped: bool) -> None:
+        """It has ended; ``stopped``: a stop was wanted."""
+        repetition = self._file.repetition
+        if isinstance(end, SequenceState):
+            taken_s = self._client.session.clock() - self._begun_s
+            repetition.end_rows(end, fault_name(end.code), self._client.counters(), taken_s, lost)
+            return
         state = FAULT if end.fault else INTERRUPTED if stopped else COMPLETE
-        self._file.repetition.end(state, fault_name(end.fault), end.ticks, end.positions, end.lost)
-        self._file.repetition.notices = readable(end.notices)
-
-    def end_rows(self, followed: SequenceFollower) -> None:
-        """A sequence has ended."""
-        end, taken_s = followed.end, self._client.session.clock() - self._begun_s
-        self._file.repetition.end_rows(
-            end, fault_name(end.code), self._client.counters(), taken_s, followed.lost
-        )
+        repetition.end(state, fault_name(end.fault), end.ticks, end.positions, lost)
+        repetition.notices = readable(end.notices)
 
 
 @contextmanager
 def repetition(client: Client, encoded: Encoded, folder: RunFolder, watcher: Watcher) -> Iterator[Recorder]:
     """One start of a motion or sequence, recorded in the run folder, also if it ends early; then the watcher is told.
 
-    If neither ``end`` nor ``end_rows`` is called, it was interrupted, or its connection is broken.
+    If ``end`` is not called, it was interrupted, or its connection is broken.
     """
     with folder.begin_repetition(with_rows=encoded.is_sequence) as file:
         yield Recorder(client, encoded, folder, file, watcher)
     watcher.end(file.repetition)
 
 
-def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> RunFolder:
+def fetch(client: Client, motion: Encoded, folder_in: Path, port: str) -> RunFolder:
     """Write the samples that the board kept of its last run (of ``motion``) into a new run folder.
 
     Waits for the end of a run in progress. Raises LinkError if the board has no samples, or they are of a sequence.
@@ -170,5 +182,7 @@ def fetch(client: Client, motion: EncodedMotion, folder_in: Path, port: str) -> 
         for sample in chain([first] if first else [], samples):
             recorder.take(sample)
         end = follower.end
-        recorder.end(end, end.path_ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S)
+        recorder.end(
+            end, end.lost, end.path_ticks < motion.trajectory.duration_s * TICK_HZ - TICK_HZ * _END_S
+        )
     return folder

@@ -1,4 +1,4 @@
-"""Start, follow and stop what the board runs."""
+"""Start, follow and stop what the board runs; change its speed."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from contextlib import contextmanager, suppress
 from typing import TypeVar
 
 from armtempo_shared import wire
-from armtempo_shared.messages import ONCE_NAME
+from armtempo_shared.messages import ONCE_NAME, PERMILLE, RESUME, SLOWEST_PERMILLE
 
-from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
-from armtempo.encoding.encoded_motion import MotionKey
+from armtempo.basics.arguments import checked
+from armtempo.basics.errors import BoardError, InputError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.encoding.encoded_plan import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import SequenceState
 from armtempo.link.follow import CHECK_S, Followed, Follower, RunEnd, where
@@ -29,9 +30,22 @@ LOCK_S = 1.0
 """A request from another thread waits this long for its turn to talk to the board."""
 
 
-def put_once(client: Client, data: bytes) -> MotionKey:
-    """Put a motion record into the board's memory, to be run once; raises InputError if it is too large."""
-    return MotionKey(ONCE_NAME, client.put_once(data))
+_STORED = "tmp-move"
+"""Name on the board of a move that is larger than its memory."""
+
+
+@contextmanager
+def on_board(client: Client, data: bytes) -> Iterator[MotionKey]:
+    """Put a motion record on the board, to be run once: in its memory, or, if larger, stored until the context ends."""
+    if len(data) <= client.info.once_bytes:
+        yield MotionKey(ONCE_NAME, client.put_once(data))
+        return
+    client.upload(_STORED, data)
+    try:
+        yield MotionKey(_STORED, wire.record_crc(data))
+    finally:
+        with suppress(LinkError):  # do not hide the earlier error
+            client.remove(_STORED)
 
 
 def nothing(event: Followed) -> None:
@@ -174,9 +188,11 @@ def fault_name(code: int) -> str:
     return wire.ERRORS.get(code, (f"code {code}",))[0] if code else ""
 
 
-def raise_fault(end: RunEnd) -> None:
-    """Raise BoardError, with the text of the fault, if a fault ended the run."""
-    if end.fault:
+def raise_failure(client: Client, end: RunEnd | SequenceState) -> None:
+    """Raise BoardError if a fault ended a run, or the board refused a motion of its sequence."""
+    if isinstance(end, SequenceState):
+        raise_sequence_failure(client, end)
+    elif end.fault:
         said = "".join(f"; the board says: {text.strip()}" for text in readable(end.notices))
         raise refusal(f"a fault ended the motion{said}", end.fault, end.fault_joint)
 
@@ -204,3 +220,26 @@ def readable(notices: tuple[str, ...]) -> tuple[str, ...]:
     from armtempo.deploy.program_files import in_full  # imported here, because it reads the whole program
 
     return tuple(map(in_full, notices))
+
+
+@checked
+def permille(fraction: float) -> int:
+    """A fraction of the planned speed, 0.01 to 1, in thousandths; raises InputError for another."""
+    rate = round(fraction * PERMILLE)
+    if not SLOWEST_PERMILLE <= rate <= PERMILLE:
+        raise InputError(
+            f"a speed of {fraction:g} times the planned one, {100 * fraction:g} %, is not allowed",
+            f"give a fraction of {SLOWEST_PERMILLE / PERMILLE:g} to 1 (1 to 100 % on the command line); a faster "
+            "motion needs a plan with higher limits",
+        )
+    return rate
+
+
+def change_speed(client: Client, rate: int) -> None:
+    """Set the speed of the running and of later motions to ``rate`` thousandths (0: pause, RESUME: end of the pause).
+
+    Raises BoardError if nothing moves, or the board refuses.
+    """
+    client.speed(rate)
+    if rate not in (0, RESUME):
+        client.rate = rate

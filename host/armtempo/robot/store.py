@@ -12,15 +12,14 @@ from armtempo_shared.sequence import KIND_BYTES, SequenceData, SequenceError
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError, LinkError
 from armtempo.basics.progress import Progress
-from armtempo.encoding import encoded_motion, encoded_program, flash_use, made_with
-from armtempo.encoding.encoded_motion import EncodedMotion, MotionKey
-from armtempo.encoding.encoded_sequence import Encoded
+from armtempo.encoding import encoded_plan, flash_use, made_with
+from armtempo.encoding.encoded_plan import Encoded, MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model.arm import Arm
 from armtempo.model.job import NAME_RULE, is_name
 from armtempo.model.parts import PROGRAM
-from armtempo.model.sequence_plan import AnyPlan, SequencePlan, load_plan
+from armtempo.model.plan import Plan
 from armtempo.robot.connection import Connection
 
 LOG = logging.getLogger("armtempo")
@@ -31,7 +30,11 @@ _KINDS = {sequence.MAGIC[:KIND_BYTES]: "sequence", program.MAGIC[:KIND_BYTES]: "
 
 def what_is_old(client: Client, entry: StoredMotion, arm: Arm) -> str:
     """What has changed in the arm since a stored motion, sequence or program was made with it; "" for nothing."""
-    check = encoded_program.check_stored if entry.program else made_with.check_stored
+    check = made_with.check_stored
+    if entry.program:
+        from armtempo.encoding import encoded_program  # here, because it loads the inverse kinematics
+
+        check = encoded_program.check_stored
     try:
         check(entry.name, client.fetch(entry.name), arm)
     except InputError as error:
@@ -61,7 +64,7 @@ class BoardStore:
 
     def upload(
         self,
-        motion: AnyPlan | Encoded | Path | str,
+        motion: Plan | Encoded | Path | str,
         name: str | None = None,
         default: bool = False,
         progress: Progress | None = None,
@@ -75,7 +78,8 @@ class BoardStore:
         default, the button starts nothing. Raises LinkError if there is something else and ``replace`` is
         false, or the board is set up for another arm.
         """
-        found = self._board.encoded(load_plan(motion) if isinstance(motion, Path | str) else motion, name)
+        found = encoded_plan.of_any(motion, name)
+        self._board.configure_for(found.arm, found.plan)
         store(self._board.client, found.records, progress, replace)
         if default:
             self._board.client.set_default(found.name)
@@ -89,7 +93,7 @@ class BoardStore:
 
     def upload_sequence(
         self,
-        sequence: SequencePlan,
+        sequence: Plan,
         default: bool = False,
         progress: Progress | None = None,
         replace: bool = False,
@@ -101,16 +105,17 @@ class BoardStore:
         """The stored motions and sequences."""
         return tuple(self._board.client.stored())
 
-    def read(self, name: str, arm: Arm | Path | str | None = None) -> EncodedMotion:
+    def read(self, name: str, arm: Arm | Path | str | None = None) -> Encoded:
         """Read a stored motion back.
 
         ``arm``: the arm it was made for; default: the board's. Raises InputError if the record is damaged or
         does not fit the arm.
         """
-        data = self._board.client.fetch(stored_name(name))
-        if kind := _KINDS.get(data[:KIND_BYTES]):
-            raise InputError(f"{name!r} is a {kind}, not a motion", f"run it with 'armtempo run {name}'")
-        return encoded_motion.of_record(name, data, self._board.known_arm() if arm is None else Arm.of(arm))
+        arm = self._board.known_arm() if arm is None else Arm.of(arm)
+        found = encoded_plan.of_board(stored_name(name), arm, self._board.client.fetch)
+        if found.is_sequence:
+            raise InputError(f"{name!r} is a sequence, not a motion", f"run it with 'armtempo run {name}'")
+        return found
 
     def remove(self, name: str) -> None:
         """Remove a stored motion."""

@@ -12,10 +12,51 @@ from armtempo.kinematics.chain import all_angles_deg
 from armtempo.model import mesh_files, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.workspace import FAR_MM, KeepOut, Workspace
-from armtempo.panel import arm_scene
+from armtempo.panel import arm_scene, charts
 from armtempo.panel.arm_scene import ArmShape
 
 from tests.host.panel.fakes import ARM
+
+PAGES = ("#ffffff", "#121212")
+"""The backgrounds of a light and of a dark page, which is Quasar's."""
+SHADE = 0.7
+"""Of a surface that is turned away from the scene's lamp."""
+
+
+def _luminance(colour: str) -> float:
+    """Relative luminance by WCAG 2.1."""
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.03928 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def _contrast(one: float, other: float) -> float:
+    return (max(one, other) + 0.05) / (min(one, other) + 0.05)
+
+
+def _through(front: str, back: str, opacity: float) -> str:
+    pairs = zip(bytes.fromhex(front[1:]), bytes.fromhex(back[1:]), strict=True)
+    return "#" + bytes(round(a * opacity + b * (1 - opacity)) for a, b in pairs).hex()
+
+
+def test_what_is_drawn_is_seen_on_light_and_on_dark_pages() -> None:
+    """Graphics need a contrast of 3 to 1."""
+    lit = (arm_scene.COLOUR, arm_scene.JOINT, arm_scene.VIA, arm_scene.TOOL)
+    lines = (arm_scene.OBSTACLE, arm_scene.WAY, arm_scene.RUN, arm_scene.DIAL, *arm_scene.AXES)
+    times = np.linspace(0.0, 1.0, 100)
+    path, _ = arm_scene.colours_of_speed(np.outer(times**2, (1.0, 0.0, 0.0)), times)
+    speeds = ["#" + bytes((255 * rgb).round().astype(np.uint8)).hex() for rgb in path]
+    for page, ghost in zip(PAGES, arm_scene.GHOST, strict=True):
+        back = _luminance(page)
+        for colour in (
+            *lit,
+            *lines,
+            *speeds,
+            *charts.COLOURS,
+            _through(ghost, page, arm_scene.GHOST_OPACITY),
+        ):
+            shades = (1.0, SHADE) if colour in lit else (1.0,)
+            assert all(_contrast(shade * _luminance(colour), back) >= 3.0 for shade in shades), (colour, page)
 
 
 def test_the_picture_has_the_radii_and_the_room_of_the_arm_file() -> None:
@@ -99,6 +140,22 @@ def test_the_views_hold_an_arm_anywhere_on_its_rail(low: float, high: float) -> 
     for place in (low, high):
         away = shape.outline(np.array([place, *arm.home_deg[1:]])) - shape.middle
         assert np.linalg.norm(away, axis=1).max() <= 1.0
+
+
+@pytest.mark.parametrize("name", ["paper", "ar4", "scara", "moveo"])
+def test_the_views_hold_the_home_posture(name: str) -> None:
+    """In a picture as high as it is wide, of 75 degrees, which is that of the scene's camera."""
+    arm = Arm.of(name)
+    shape = ArmShape(arm)
+    points = shape.outline(np.array(arm.home_deg))
+    target = shape.middle + arm_scene.TARGET
+    for view in ("side", "top", "free"):
+        eye = shape.eye(view)
+        ahead = (target - eye) / np.linalg.norm(target - eye)
+        right = np.cross(ahead, (0.0, 0.0, 1.0))
+        right /= np.linalg.norm(right)
+        seen = (points - eye) @ np.stack([right, np.cross(right, ahead), ahead], axis=1)
+        assert (np.abs(seen[:, :2]) < np.tan(np.radians(37.5)) * seen[:, 2:]).all(), view
 
 
 def test_the_view_from_above_is_aligned_with_the_axes() -> None:

@@ -88,7 +88,7 @@ def test_via_points_of_an_arm_with_a_slide_are_written_without_degrees(tmp_path:
 
 
 def test_the_files_are_the_jobs_of_the_folder(editor: JobEditor) -> None:
-    assert editor.files() == ["job.toml", "rows.toml"]
+    assert editor.files() == ["damaged.toml", "job.toml", "rows.toml"]
     with pytest.raises(InputError, match="no such job"):
         editor.open("../job.toml")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -35,6 +36,48 @@ def opened(page: Page, text: str = POSES) -> None:
     page.look()
 
 
+def test_a_file_that_another_program_writes_is_shown_but_takes_the_place_of_no_changes(
+    operator: PanelBoard,
+) -> None:
+    jobs = operator.jobs
+    with pages(operator) as page:
+        opened(page)
+        file = jobs.folder / "poses.toml"
+        for number, other in enumerate((POSES.replace("310", "320"), "name = 'a file that is half", POSES)):
+            file.write_text(other)
+            os.utime(file, ns=(number, number))
+            page.act(page.of.refresh)
+            page.look()
+            is_read = other.startswith('name = "poses"')
+            assert (jobs.text == other) == is_read
+            assert page.named(words.READ_AGAIN).visible == (not is_read)
+        jobs.set_key(1, "dwell_s", "0.7")
+        file.write_text(POSES.replace("310", "330"))
+        os.utime(file, ns=(9, 9))
+        page.act(page.of.refresh)
+        assert "dwell_s = 0.7" in jobs.text
+        page.press(words.READ_AGAIN)
+        page.answer(words.LOSE)
+        page.look()
+        assert jobs.text == POSES.replace("310", "330")
+        assert not page.named(words.READ_AGAIN).visible
+
+
+def test_changes_that_are_not_saved_are_not_lost_without_a_question(operator: PanelBoard) -> None:
+    jobs = operator.jobs
+    with pages(operator) as page:
+        opened(page)
+        (jobs.folder / "other.toml").write_text(POSES.replace("310", "320"))
+        page.look()
+        jobs.set_key(1, "dwell_s", "0.7")
+        files = page.named(words.JOB_FILE)
+        page.act(lambda: files.set_value("other.toml"))
+        assert (files.value, "dwell_s = 0.7" in jobs.text) == ("poses.toml", True)
+        page.answer(words.LOSE)
+        page.look()
+        assert (files.value, jobs.file) == ("other.toml", jobs.folder / "other.toml")
+
+
 def type_into(page: Page, name: str, text: str, left: bool = True) -> Any:
     """Type into a field, and leave it or not; the field."""
     box = page.named(name)
@@ -44,27 +87,24 @@ def type_into(page: Page, name: str, text: str, left: bool = True) -> Any:
     return box
 
 
-@pytest.mark.parametrize("elsewhere", ["field", "option", "key", "other page"])
-def test_what_is_being_typed_stays_when_another_field_changes(operator: PanelBoard, elsewhere: str) -> None:
-    """The next field is typed into before the last one is taken."""
+def test_what_is_being_typed_stays_when_another_field_changes(operator: PanelBoard) -> None:
+    """The next field is typed into before the last one is taken; so it is whatever else changes the job meanwhile."""
     with pages(operator) as page:
         opened(page)
         page.fire(page.named(f"{words.MORE} P1"), "click", {})
         typed = type_into(page, "P2 joint 1", "1", left=False)
-        if elsewhere == "field":
-            type_into(page, "P2 joint 2", "-61")
-        elif elsewhere == "option":
-            page.named(words.OPTIONS["path"]).set_value("through")
-        elif elsewhere == "key":
-            type_into(page, f"P1: {words.VIA_KEYS['dwell_s']}", "0.5")
-        else:
-            operator.jobs.set_key(1, "dwell_s", "0.5")
-        page.look()
-        assert page.named("P2 joint 1") is typed
-        assert typed.value == "1"
+        for change in (
+            lambda: type_into(page, "P2 joint 2", "-61"),
+            lambda: page.named(words.OPTIONS["path"]).set_value("through"),
+            lambda: type_into(page, f"P1: {words.VIA_KEYS['dwell_s']}", "0.5"),
+            lambda: operator.jobs.set_key(1, "dwell_s", "0.7"),  # of another page
+        ):
+            change()
+            page.look()
+            assert page.named("P2 joint 1") is typed
+            assert typed.value == "1"
         page.fire(typed, "change", "12")
-        wanted = (12.0, -61.0 if elsewhere == "field" else -60.0, 40.0)
-        assert operator.jobs.vias[2].angles_deg == pytest.approx(wanted)
+        assert operator.jobs.vias[2].angles_deg == pytest.approx((12.0, -61.0, 40.0))
 
 
 def test_a_page_without_control_changes_nothing_in_the_job(operator: PanelBoard) -> None:

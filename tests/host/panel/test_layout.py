@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import time
+from dataclasses import asdict
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,10 +13,10 @@ import pytest
 from armtempo.panel import layout, words
 from armtempo.panel.arm_scene import ArmShape
 from armtempo.panel.panel_board import FREEZE_AFTER_S, PanelBoard
-from nicegui import Client
+from nicegui import Client, ui
 from nicegui.page import page as page_of
 
-from tests.host.panel.fakes import ARM, Clock, board_state, unhomed
+from tests.host.panel.fakes import ARM, Clock, board_state, press, unhomed
 from tests.host.panel.pages import built, pages
 
 TABS = (words.TAB_MOVE, words.TAB_JOB, words.TAB_RUN, words.TAB_SEQUENCE, words.TAB_BOARD)
@@ -145,3 +146,21 @@ def test_stops_of_other_pages_are_heard_while_a_page_is_built(operator: PanelBoa
         page.loop.run_until_complete(both())
         client.delete()
     assert max(after - before for before, after in itertools.pairwise(counts)) < counts[-1] / 2
+
+
+def test_a_press_on_what_has_just_turned_grey_is_refused_with_the_reason(
+    operator: PanelBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The browser does not know yet that it is grey; without a word the person would wait for a dialog."""
+    shown: list[str] = []
+    monkeypatch.setattr(ui, "notify", lambda text, **_: shown.append(text))
+    operator.live.state = board_state()
+    with pages(operator) as page:
+        page.look()
+        operator.busy = words.JOG
+        page.look()
+        home: Any = page.named(words.HOMING)
+        assert (home.enabled, home.is_ignoring_events) == (False, False)
+        page.fire(home, "click", asdict(press(operator)), None, is_command=True)
+        assert shown == [f"{words.BUSY.format(what=words.JOG)}; {words.WAIT}"]
+        assert not page.elements(ui.dialog)

@@ -82,9 +82,22 @@ def test_a_state_that_is_old_says_how_old(operator: PanelBoard) -> None:
     assert re.fullmatch(r"moving at 20 % · last heard 3\.\d s ago · port", live_texts.state_line(operator))
 
 
+def test_a_picture_of_an_arm_that_is_not_heard_says_how_old_it_is(operator: PanelBoard) -> None:
+    operator.live.ask(Telling(board_state()))  # type: ignore[arg-type]
+    shape = ArmShape(ARM)
+    operator.live.heard_s -= 3.0
+    assert not layout.message(operator, shape)["old"]  # a busy machine
+    operator.trouble = "the cable is out"
+    told = layout.message(operator, shape)
+    assert told["old"]
+    assert re.fullmatch(r"last heard 3\.\d s ago", told["texts"]["armtempo-unknown"])
+
+
 def test_a_pause_is_named_as_one(operator: PanelBoard) -> None:
     operator.live.state = board_state(state="moving", moving=True, speed_percent=0.0)
     assert live_texts.state_line(operator).startswith("paused")
+    operator.live.held = True  # a jog that was released
+    assert live_texts.state_line(operator).startswith("moving")
 
 
 def test_no_angle_is_minus_zero(operator: PanelBoard) -> None:
@@ -103,11 +116,14 @@ def test_outputs_and_inputs_are_those_of_the_board(tmp_path: Path) -> None:
     [
         ("nothing", "", (), False),
         ("cable", "the cable is out", (), True),
+        ("cable in a run", "the cable is out", (), True),
+        ("deployed to", "", (), False),
         ("no program", "another program runs", (Cure.DEPLOY,), True),
         ("fault", "E-stop", (Cure.CLEAR,), True),
         ("frozen", "may have moved on", (Cure.HOME,), True),
         ("failed", "run: the arm is elsewhere", (Cure.DISMISS,), True),
         ("unhomed", "Home it", (Cure.HOME,), False),
+        ("reset in a run", "run: the board has restarted", (Cure.HOME, Cure.DISMISS), True),
     ],
 )
 def test_the_banner_says_what_is_wrong_and_has_the_button_that_helps(
@@ -117,6 +133,10 @@ def test_the_banner_says_what_is_wrong_and_has_the_button_that_helps(
     live.state = board_state()
     if what == "cable":
         operator.trouble = "the cable is out"
+    elif what == "cable in a run":
+        operator.trouble, operator.busy = "the cable is out", "run"
+    elif what == "deployed to":
+        operator.trouble, operator.busy, operator._board = "the cable is out", "deploy", None
     elif what == "no program":
         operator.trouble, operator._board = "another program runs", None
     elif what == "fault":
@@ -127,8 +147,10 @@ def test_the_banner_says_what_is_wrong_and_has_the_button_that_helps(
         operator.failure = "run: the arm is elsewhere"
     elif what == "unhomed":
         live.state = unhomed()
+    elif what == "reset in a run":
+        live.state, operator.failure = unhomed(), "run: the board has restarted"
     found = problem.of(operator)
-    assert (found is None) == (what == "nothing")
+    assert (found is None) == (not said)
     if found is not None:
         assert said in found.text
         assert (found.cures, found.is_fault) == (cures, is_fault)

@@ -26,6 +26,7 @@ from tests.host.panel.fakes import ARM, board_state, press, unhomed
 from tests.host.panel.pages import Page, pages
 
 
+@pytest.mark.slow
 def test_a_typed_pose_is_reached_by_the_nearest_posture() -> None:
     here = np.array([10.0, -60.0, 40.0])
     place = forward(ARM, (20.0, -70.0, 50.0))[:3, 3].tolist()
@@ -185,15 +186,20 @@ def test_a_joint_is_homed_alone(operator: PanelBoard) -> None:
         assert operator.live.doubt  # of the others
 
 
-def test_homing_by_switches_tells_each_joint(operator_of: Callable[[Arm], PanelBoard]) -> None:
+def test_homing_by_switches_tells_each_joint_and_claims_no_position(
+    operator_of: Callable[[Arm], PanelBoard], monkeypatch: pytest.MonkeyPatch
+) -> None:
     operator = operator_of(Arm.of("ar4"))
+    operator.live.state = board_state()  # as the board says while it homes
+    known: list[bool] = []
+    monkeypatch.setattr(operator, "part", lambda *_: known.append(operator.live.known))
     with pages(operator) as page:
         page.press(words.HOMING)
         page.named(words.WHICH_JOINTS).set_value(operator.arm.driven[2].name)
         page.press(words.HOME_BY_SWITCHES)
         page.done()
         assert any("switch seen" in line for line in operator.log.last)
-        assert operator.progress == 0.5
+        assert (known, operator.live.known) == ([False], True)
 
 
 def test_the_table_is_asked_for_where_the_arm_file_names_none(

@@ -136,6 +136,9 @@ def test_a_board_that_does_not_answer_can_be_deployed_to_and_nothing_else(tmp_pa
     told[-1]("the cable is out; waiting for it to come back")
     assert "cable" in made.why_not(ME, Needs.BOARD)
     assert "cable" in made.log.last[-1]
+    told[-1]("connected again")
+    assert "cable" in made.trouble  # until the board has said its state
+    assert "connected" in made.log.last[-1]
     logging.getLogger("armtempo").warning("the link of joint 1 is inside of the floor")  # by a plan
     assert "inside of the floor" in made.log.last[-1]
     made.close()

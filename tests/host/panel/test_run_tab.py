@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.basics.errors import RunFolderError
+from armtempo.basics.progress import Progress
 from armtempo.panel import layout, past_runs, words
 from armtempo.panel.panel_board import PanelBoard
 from armtempo.report import run_report
@@ -114,6 +115,30 @@ def test_the_plan_is_named_with_its_duration_and_file(operator: PanelBoard, run_
     run_page.look()
     assert words.PLAN_IS_OLD in run_page.texts()
     assert not run_page.named(words.RUN).enabled
+
+
+def test_what_is_left_of_a_run_counts_all_repetitions_at_the_boards_speed(
+    operator: PanelBoard, run_page: Page
+) -> None:
+    """Nothing of a run is done when its upload is."""
+    said: list[str] = []
+
+    def upload(plan: object, replace: bool, progress: Progress) -> None:
+        progress(9, 9)
+
+    def run(plan: Any, times: int, runs: object, progress: Progress, stop: object) -> None:
+        for done_s in (None, 0.25 * times * plan.total_s):
+            if done_s is not None:
+                progress(done_s, times * plan.total_s)
+            run_page.of.refresh()
+            said.extend(text for text in run_page.texts() if "left" in text)
+
+    operator.board.upload, operator.board.run = upload, run  # type: ignore[method-assign, assignment]
+    operator.live.state = board_state(speed_percent=50.0)
+    run_page.named(words.REPEAT).set_value(2)
+    run_page.press(words.RUN)
+    run_page.done()
+    assert said == ["feed: 0%, 27 s left", "feed: 25%, 20 s left"]
 
 
 @pytest.mark.parametrize("number", [0, 100, 1.5, None])

@@ -45,7 +45,9 @@ def steps(tmp_path: Path) -> SequenceEditor:
     (tmp_path / "job.toml").write_text('name = "feed"\nvia_deg = [[0, -60, 40], [20, -75, 50]]\n')
     (tmp_path / "damaged.toml").write_text("[[step")
     desk = SequenceEditor(ARM, tmp_path)
-    assert desk.files() == ["day.toml"]
+    assert desk.files() == ["damaged.toml", "day.toml"]
+    with pytest.raises(InputError, match="damaged"):
+        desk.open("damaged.toml")
     desk.open("day.toml")
     return desk
 
@@ -89,7 +91,7 @@ def test_steps_that_are_no_sequence_are_not_saved(steps: SequenceEditor) -> None
     assert steps.steps[1] == steps.steps[2] == {"goto": "[10, -60, 40]"}
     steps.new("fresh")
     assert steps.save().name == "fresh.toml"
-    assert steps.files() == ["day.toml", "fresh.toml"]
+    assert steps.files() == ["damaged.toml", "day.toml", "fresh.toml"]
     with pytest.raises(InputError, match="no such sequence"):
         steps.open("../day.toml")
 
@@ -103,6 +105,22 @@ def test_cycles_are_counted_from_one(operator: PanelBoard, ending: str, cycle: i
     with pages(operator) as page:
         page.show(words.TAB_SEQUENCE)
         assert said in page.texts()
+
+
+def test_another_kind_of_a_step_builds_its_row_alone_anew(operator: PanelBoard, tmp_path: Path) -> None:
+    """In the others a list may be open, which would close."""
+    (tmp_path / "day.toml").write_text(SEQUENCE)
+    operator.sequences.open("day.toml")
+    with pages(operator) as page:
+        page.show(words.TAB_SEQUENCE)
+        kinds = [page.named(f"{words.STEP} {number}") for number in (1, 2, 3, 4)]
+        kinds[2].set_value("output")
+        page.look()
+        again = [page.named(f"{words.STEP} {number}") for number in (1, 2, 3, 4)]
+        assert [one is other for one, other in zip(kinds, again, strict=True)] == [True, True, False, True]
+        assert page.named(f"step 3: {words.STEP_KEYS['to']}").value == ""
+        page.act(lambda: [connected() for connected in page.client.connect_handlers])
+        assert page.named(f"{words.STEP} 1") is kinds[0]
 
 
 def test_what_is_typed_on_into_a_step_that_was_just_taken_stays(operator: PanelBoard, tmp_path: Path) -> None:

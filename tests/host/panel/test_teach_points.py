@@ -188,7 +188,7 @@ def test_what_the_arm_has_anew_is_offered_on_every_page_and_makes_plans_old(
                 "arm": operator.arm,
                 "frames": ("tray",),
                 "loaded_legs": (),
-                "loads": (),
+                "legs": (),
                 "pallets": (),
                 "job": type("Job", (), {"name": "feed", "holds": ""}),
                 "total_s": 1.0,

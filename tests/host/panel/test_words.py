@@ -48,6 +48,7 @@ def test_commands_are_the_panels_buttons(text: str, wanted: str) -> None:
         ),
         ("no motion along this path is shorter", "no motion along this path is shorter"),
         ("the stop at P1 is 5 s", "the stop at P1 is 5 s"),
+        ("not valid TOML (at line 1, column 10)", "not valid TOML (at line 1, column 10)"),
     ],
 )
 def test_keys_are_the_panels_fields(text: str, wanted: str) -> None:

@@ -7,6 +7,7 @@ posture, where small motions of the tool need large motions of the joints. The a
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -41,6 +42,10 @@ MARGIN_STEPS = 2.0
 _TRIED = (WHOLE, (APPROACH,), (PITCH,), (YAW,), (ROLL,), ())
 _PARALLEL = 0.99
 _HALVINGS = 8
+_AT_ONCE = 32
+"""Postures that are found together: more take longer where the line ends soon, fewer where it is long."""
+_LEFT = 1e-9
+"""Part of the length at its end that is not followed: rounding."""
 _STEPS_TO_JUDGE = 3
 _SMALL_RAD = 1e-5
 _SINGULAR = 1e-3
@@ -201,6 +206,27 @@ class ToolLine:
             return f"the posture is nearly singular: {joint.name} would {goes} too far"
         return angles
 
+    def _near_all(
+        self, distances: Sequence[float], start: Array, fixed: tuple[str, ...], step: Array
+    ) -> Array:
+        """As ``_near`` for many distances, as far as it can be found for all at once: (n, joints).
+
+        ``start``: near each, (K, joints), or near the first, (joints,), each other near the one before. ``step``: (K,).
+        """
+        if fixed != WHOLE:
+            return np.empty((0, start.shape[-1]))
+        poses = np.stack([self.pose(distance) for distance in distances])
+        found = self._solver.nearest_of_many(poses, start, (TOLERANCE_MM, TOLERANCE_DEG))
+        before = np.vstack([start, found])[: len(found)] if start.ndim == 1 else start[: len(found)]
+        most = MOST_GAIN * (np.radians(step) if self.about else step / self.reach_mm)
+        wrong = np.any(
+            np.abs(found - before) * self._parts_of_reach > most[: len(found), None] + 1e-9, axis=1
+        )
+        for index, _, low, high in self._bounds_deg:
+            angles = np.degrees(found[:, index])
+            wrong |= (angles < low) | (angles > high)
+        return found[: np.argmax([*wrong, True])]
+
     @cached_property
     def _parts_of_reach(self) -> Array:
         """Of each joint: how far it moves the tool for a radian of the kinematics, at most, by the reach: (joints,)."""
@@ -231,7 +257,15 @@ class ToolLine:
         distances, postures = [0.0], [self._start]
         ends = ""
         step = min(self.step, length / _STEPS_TO_JUDGE)
-        while not ends and distances[-1] < length:
+        while not ends and length - distances[-1] >= _LEFT * length:
+            ahead = [distances[-1]]
+            while len(ahead) <= _AT_ONCE and length - ahead[-1] >= _LEFT * length:
+                ahead.append(ahead[-1] + min(step, length - ahead[-1]))
+            together = self._near_all(ahead[1:], postures[-1], fixed, np.diff(ahead))
+            distances += ahead[1 : len(together) + 1]
+            postures += [*together]
+            if len(together) == len(ahead) - 1:
+                continue
             here = min(step, length - distances[-1])
             found = self._near(distances[-1] + here, postures[-1], fixed, here)
             for _ in range(_HALVINGS):
@@ -243,8 +277,6 @@ class ToolLine:
                 break
             distances.append(distances[-1] + here)
             postures.append(found)
-            if length - distances[-1] < 1e-9 * length:
-                break
         return FollowedLine(self, np.array(distances), np.array(postures), ends)
 
 
@@ -267,15 +299,17 @@ class FollowedLine:
 
     def at(self, distances: Array) -> Array:
         """The driven joints at distances along it, degrees (K, J); raises InputError if the tool cannot follow."""
-        found = []
-        line = self.line
-        for distance in distances:
-            near = np.array([np.interp(distance, self.distances, column) for column in self.angles_rad.T])
-            angles = line._near(float(distance), near, line.fixed, max(line.step, 1e-3))
+        line, step = self.line, max(self.line.step, 1e-3)
+        near = np.stack(
+            [np.interp(distances, self.distances, column) for column in self.angles_rad.T], axis=1
+        )
+        found = [*line._near_all(distances.tolist(), near, line.fixed, np.full(len(distances), step))]
+        for distance, start in zip(distances[len(found) :].tolist(), near[len(found) :], strict=True):
+            angles = line._near(distance, start, line.fixed, step)
             if isinstance(angles, str):
                 raise InputError(f"the tool cannot follow the line: {angles}", "jog single joints")
-            found.append(np.degrees(angles[list(line.arm.driven_indices)]))
-        return np.array(found)
+            found.append(angles)
+        return np.asarray(np.degrees(np.array(found)[:, list(line.arm.driven_indices)]))
 
     def is_kept(self, angle_points_deg: Array, distance_points: Array) -> bool:
         """Whether it is proven that the tool keeps to it, for splines of the driven joints, (S + 5, J), and of the

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,13 +15,15 @@ from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
 from armtempo.model.arm import Arm
-from armtempo.model.parts import DrivenJoint
+from armtempo.model.parts import END_STEPS, DrivenJoint
 from armtempo.planning import brake_time, move_law, point_to_point, workspace_check
 from armtempo.planning.brake_time import BrakeTimes
-from armtempo.planning.jog.jog_line import FollowedLine, ToolLine, direction_of
 from armtempo.planning.move_law import DEGREE, MoveLimits
 from armtempo.splines import bspline, extremes
 from armtempo.splines.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from armtempo.planning.jog.jog_line import FollowedLine, ToolLine
 
 SPEED = 0.25
 """Default speed, as a fraction of the arm's speed limits."""
@@ -210,8 +213,8 @@ def _end_deg(joint: DrivenJoint, here: float, by: float) -> tuple[float, str]:
     """
     low, high = joint.travel_deg
     wanted = here + by
-    if low <= wanted <= high:
-        return wanted, ""
+    if (low - wanted) * joint.steps_per_deg <= END_STEPS >= (wanted - high) * joint.steps_per_deg:
+        return min(max(wanted, low), high), ""
     at_end = f"{joint.name} is at {joint.end_of_travel('high' if by > 0 else 'low')}"
     edge = min(high, wanted) if by > 0 else max(low, wanted)
     scale = joint.steps_per_deg
@@ -241,6 +244,11 @@ def _tool(name: str, arm: Arm, start: Array, move: JogMove, speed: float) -> tup
 
 def _line(arm: Arm, start: Array, move: JogMove) -> ToolLine:
     """The line of the tool; InputError if there is no such axis, or the arm cannot be at ``start``."""
+    from armtempo.planning.jog.jog_line import (  # here, because joints need no kinematics
+        ToolLine,
+        direction_of,
+    )
+
     direction_of(arm, move.axis, np.eye(4))  # raises InputError for an axis that there is not
     point_to_point.posture(start, arm)
     return ToolLine(arm, start, move.axis, move.about, 1 if move.by > 0 else -1)

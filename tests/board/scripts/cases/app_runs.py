@@ -219,10 +219,15 @@ def case_a_homing_start_names_whose_switches_end_it():
     app, host = connected()
     crc = wire.record_crc(host.record)
     engine = app.controller.board.engine
-    for mask, watched in ((0, 0b11), (0b10, 0b10)):  # without a mask: of both joints, which move
-        flags = messages.START_HOMING | mask << messages.START_SWITCHES_BIT
+    for mask, seeks, watched in (
+        (0, 0, 0b11),  # of both joints, which move
+        (0b10, 0, 0b10),
+        (0, messages.START_SEEKS, 0b11),
+        (0b10, messages.START_SEEKS, 0b10),
+    ):
+        flags = messages.START_HOMING | mask << messages.START_SWITCHES_BIT | seeks
         assert host.ask("start", (flags, crc), "feed")[0] == "ok"
-        assert engine.homing == watched
+        assert (engine.homing, engine.seeks) == (watched, seeks != 0)
         engine.finish()
         host.turn(10)
 

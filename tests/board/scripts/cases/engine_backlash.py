@@ -14,7 +14,7 @@ import cases
 from armtempo_shared import armrecord, codes
 from armtempo_shared.messages import RESUME
 from brake_motion import record
-from engine_rig import FEWER, TICK_HZ, Rig, arm
+from engine_rig import TICK_HZ, Rig, arm
 from firmware import external_interrupts
 
 # isort: split
@@ -155,6 +155,15 @@ def run(rig, motion):
     check_end(rig)
 
 
+def beside(motion):
+    """A rig without backlash and one with it that have made the motion."""
+    plain = made(None)
+    run(plain, motion)
+    rig = made()
+    run(rig, motion)
+    return plain, rig
+
+
 def home(rig, steps):
     """Declare where the joints are."""
     for driver, before, after in zip(rig.drivers, rig.commanded(), steps):
@@ -182,28 +191,19 @@ def check_frozen(rig, fault=0):
 def case_the_joint_follows():  # on CPython
     """At the end of a motion each joint stands where it does without backlash; one that has none has the same edges."""
     random.seed(SEED)
-    for number in range(max(2 // FEWER, 1)):
-        motion = some_motion()
-        plain = made(None)
-        run(plain, motion)
-        rig = made()
-        run(rig, motion)
-        assert rig.commanded() == plain.commanded(), (number, rig.commanded(), plain.commanded())
-        assert rig.drivers[2].steps == plain.drivers[2].steps
-        for driver, expected in zip(rig.drivers, plain.commanded()):
-            assert driver.moved() == expected, (number, driver.moved(), expected)
+    plain, rig = beside(some_motion())
+    assert rig.commanded() == plain.commanded(), (rig.commanded(), plain.commanded())
+    assert rig.drivers[2].steps == plain.drivers[2].steps
+    for driver, expected in zip(rig.drivers, plain.commanded()):
+        assert driver.moved() == expected, (driver.moved(), expected)
 
 
 def case_reversals_within_a_crossing():  # not emulated
     """However often a joint reverses before its play is crossed, it ends where it does without backlash."""
     random.seed(SEED + 6)
     seen = 0
-    for number in range(max(4 // FEWER, 1)):
-        motion = some_motion(size=120)
-        plain = made(None)
-        run(plain, motion)
-        rig = made()
-        run(rig, motion)
+    for number in range(2):
+        plain, rig = beside(some_motion(size=120))
         assert [driver.moved() for driver in rig.drivers] == plain.commanded(), number
         turned = [plain.drivers[1].steps[begin][0] for begin, _ in legs(plain.drivers[1].steps)]
         for n in range(len(turned) - 2):
@@ -216,20 +216,15 @@ def case_a_crossing_keeps_its_limits():  # not emulated
     time that it takes."""
     random.seed(SEED + 1)
     seen = 0
-    for number in range(max(2 // FEWER, 1)):
-        motion = some_motion(size=3000)
-        plain = made(None)
-        run(plain, motion)
-        rig = made()
-        run(rig, motion)
-        for joint in (0, 1):
-            merged, steps = rig.drivers[joint].steps, plain.drivers[joint].steps
-            ticks = [time for time, _ in merged]
-            least = min([ticks[n + 1] - ticks[n] for n in range(len(ticks) - 1)])
-            assert least >= TICK_HZ // 60000, (number, joint, least)
-            for begin, end in legs(steps):
-                seen += check_crossing(merged, steps, begin, end, PLAY[joint])
-    assert seen > 2 // FEWER, seen
+    plain, rig = beside(some_motion(size=3000))
+    for joint in (0, 1):
+        merged, steps = rig.drivers[joint].steps, plain.drivers[joint].steps
+        ticks = [time for time, _ in merged]
+        least = min([ticks[n + 1] - ticks[n] for n in range(len(ticks) - 1)])
+        assert least >= TICK_HZ // 60000, (joint, least)
+        for begin, end in legs(steps):
+            seen += check_crossing(merged, steps, begin, end, PLAY[joint])
+    assert seen > 2, seen
 
 
 def legs(steps):
@@ -271,19 +266,18 @@ def case_a_long_crossing_at_the_highest_rate():  # not emulated
     swing = rate * 1.5 / (2 * math.pi)
     angles = [0] * 4 + [swing * (1 - math.cos(math.pi * k / 4)) for k in range(17)] + [0] * 4
     times = [0.1875 * number for number in range(-2, len(angles) - 2)]
-    for turn_us in (1000, 8000):
-        rig = made([play] * 3, acceleration=rate**2 / play, rows=joints(max_rate=10100), turn_us=turn_us)
-        run(rig, record(control_points=[angles] * 3, time_points=times))
-        steps = rig.drivers[0].steps
-        assert len(legs(steps)) == 3
-        fastest = min([steps[n + 50][0] - steps[n][0] for n in range(len(steps) - 50)])
-        assert 50 * TICK_HZ / 10000 <= fastest < 50 * TICK_HZ / 8000, (turn_us, fastest)
+    rig = made([play] * 3, acceleration=rate**2 / play, rows=joints(max_rate=10100), turn_us=8000)
+    run(rig, record(control_points=[angles] * 3, time_points=times))
+    steps = rig.drivers[0].steps
+    assert len(legs(steps)) == 3
+    fastest = min([steps[n + 50][0] - steps[n][0] for n in range(len(steps) - 50)])
+    assert 50 * TICK_HZ / 10000 <= fastest < 50 * TICK_HZ / 8000, fastest
 
 
 def case_a_slow_loop_ends_in_a_fault():  # not emulated
     """At 10000 steps/s the loop may take 8 ms; if it is too slow, the motion is frozen before steps come in a burst."""
     ran = []
-    for turn_ms in (2, 8, 15, 30):
+    for turn_ms in (8, 30):
         random.seed(SEED + 5)
         rig = made([200] * 3, acceleration=2e4, rows=joints(max_rate=200000), turn_us=1000 * turn_ms)
         rig.engine.load(some_motion(size=3000))
@@ -291,8 +285,7 @@ def case_a_slow_loop_ends_in_a_fault():  # not emulated
         rig.run_to(100 * TICK_HZ)
         ran.append((turn_ms, check_fast(rig)))
         assert rig.engine.fault in (0, codes.UNDERRUN) and rig.engine.known == 7
-    assert all([is_fine for turn_ms, is_fine in ran if turn_ms <= 8]), ran
-    assert not all([is_fine for _, is_fine in ran]), ran
+    assert ran == [(8, True), (30, False)], ran
 
 
 def change(rig):
@@ -308,7 +301,7 @@ def case_changes_and_stops():  # not emulated
     rig = made()
     run(rig, straight(20))
     place = [20, 20, 20]
-    for _ in range(12):
+    for _ in range(8):
         rig.turn_ticks = 84000 * random.choice((1, 3, 8))
         rig.engine.load(some_motion(place), random.choice((1000, 1000, 600)))
         rig.engine.start()
@@ -338,7 +331,7 @@ def case_an_estop_within_a_crossing():  # not emulated
     rig = made(flags=armrecord.FLAG_ESTOP_FITTED)
     run(rig, straight(20))
     left = 0
-    for _ in range(6):
+    for _ in range(4):
         rig.engine.load(some_motion(rig.commanded()))
         rig.engine.start()
         rig.board.at(rig.zero() + random.randrange(TICK_HZ), lambda: external_interrupts.set_level("E15", 0))
@@ -351,7 +344,7 @@ def case_an_estop_within_a_crossing():  # not emulated
         rig.turn()
         assert rig.engine.clear()
         run(rig, some_motion(rig.commanded()))
-    assert left > 2, left
+    assert left > 1, left
 
 
 def case_prepared_motions():  # not emulated

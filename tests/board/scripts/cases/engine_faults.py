@@ -7,6 +7,7 @@ import random
 import cases
 import machine_state
 from armtempo_shared import armrecord, codes
+from armtempo_shared.messages import OTHER_SWITCH
 from engine_rig import FEWER, TICK_HZ, Evaluator, Motion, Rig, Steps, arm, row
 from firmware import external_interrupts
 
@@ -306,6 +307,42 @@ def case_home_switches():
         else:
             assert rig.engine.fault == 0
             assert rig.commanded() == [steps.total() for steps in MOTION.joints]
+
+
+def set_level_at(rig, moment, pin, level):
+    rig.board.at(rig.zero() + moment, lambda: external_interrupts.set_level(pin, level))
+
+
+def case_a_homing_motion_that_seeks_ends_at_other_switches():
+    """Of joints that stand, and those at the other end; but not if one was pressed before, or for a moment alone."""
+    joints = arm(3)
+    joints[0] = row(channel=0, limit_low=1)  # the joints move to their high ends
+    joints[1] = row(channel=1, limit_high=armrecord.POLLED | 0x34, limit_active_high=1)  # PD4
+    joints[2] = row(channel=2, limit_low=armrecord.POLLED | 0x35, limit_active_high=1)  # PD5
+    for homing, seeks, pin, before, back, tripped in (
+        (0b101, True, "D4", 0, 0, 1),
+        (0b101, True, "D5", 0, 0, 2),
+        (0b101, True, "D9", 1, 0, 0),
+        (0b101, False, "D4", 0, 0, None),
+        (0b101, True, "D4", 1, 0, None),
+        (0b101, True, "D4", 0, 240_000, None),
+    ):
+        rig = Rig(joints)
+        active = int(pin != "D9")
+        for name, level in (("D4", 0), ("D5", 0), ("D9", 1)):
+            external_interrupts.set_level(name, level)
+        external_interrupts.set_level(pin, active if before and active else 1 - active)
+        rig.start(MOTION, homing, seeks)
+        set_level_at(rig, 300_000, pin, active)
+        if back:
+            set_level_at(rig, 300_000 + back, pin, 1 - active)
+        rig.run_to(MOTION.duration + TICK_HZ)
+        if tripped is None:
+            assert rig.engine.fault == 0
+            assert rig.commanded() == [steps.total() for steps in MOTION.joints], (pin, before, back)
+        else:
+            stopped(rig, 0, tripped | OTHER_SWITCH)
+            assert rig.engine.known == 7
 
 
 def case_limit_tripped_before():  # not emulated

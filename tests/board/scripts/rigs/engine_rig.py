@@ -300,12 +300,12 @@ class Rig:
         """Board time of the motion's time 0."""
         return self._zero
 
-    def start(self, motion, homing=0):
-        """Load and start a motion; ``homing``: see ``Engine.load``."""
+    def start(self, motion, homing=0, seeks=False):
+        """Load and start a motion; ``homing``, ``seeks``: see ``Engine.load``."""
         self.samples = []
         for pulses, steps in zip(self.pulses, motion.joints):
             pulses.expect(steps)
-        self.engine.load(motion, homing=homing)
+        self.engine.load(motion, homing=homing, seeks=seeks)
         self.engine.start()
 
     def refusal(self, motion):

@@ -208,12 +208,12 @@ class Engine:
 
             raise Refused(*self.unfit)
 
-    def load(self, motion, rate=1000, ready=None, homing=0):
+    def load(self, motion, rate=1000, ready=None, homing=0, seeks=False):
         if ready:
             assert ready.is_ready and ready.motion is motion and ready.rate == rate
         self.calls.append("load ready" if ready else "load unchecked" if self.skip_check else "load")
         self.rates.wanted = rate
-        self.homing = homing
+        self.homing, self.seeks = homing, seeks
         if self.refusal:
             from armtempo_board.errors import Refused
 
