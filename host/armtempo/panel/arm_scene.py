@@ -48,7 +48,9 @@ FOLLOW = "follow"
 """The view that keeps the tool in the middle."""
 EYES = {"side": (0.0, -1.4, 0.25), "top": (0.0, -0.001, 1.6), "free": (0.7, -0.85, 0.6)}
 """Where the views look from, from the arm's middle; from above x is to the right and y up."""
-_TARGET = (0.0, 0.0, 0.15)
+_NEAR = 0.6
+"""An arm whose home posture reaches further from what they look at is looked at from further away."""
+TARGET = (0.0, 0.0, 0.15)
 """What they look at, from there."""
 SLOW_TO_FAST = ((0.25, 0.42, 0.80), (0.13, 0.55, 0.35), (0.70, 0.50, 0.05), (0.87, 0.20, 0.28))
 """Colours of a path, sRGB, seen on light and dark as well: blue where it is slow, red where it is fastest."""
@@ -84,6 +86,13 @@ class ArmShape:
         self.reach_mm = self.reach_mm or 1.0
         self.middle = middle_mm / self.reach_mm
         """What the arm's base is next to when each rail that carries it is in the middle of its range, (3,)."""
+
+    def eye(self, view: str) -> Array:
+        """Where a view looks from, (3,), so that the home posture is in it."""
+        target = self.middle + TARGET
+        away = np.linalg.norm(self.outline(np.array(self.arm.home_deg)) - target, axis=1).max()
+        found: Array = target + max(1.0, away / _NEAR) * (np.array(EYES[view]) - TARGET)
+        return found
 
     def outline(self, angles_deg: Array) -> Array:
         """Points of the arm's line, (K, 3), for driven angles (J,)."""
@@ -331,7 +340,7 @@ class ArmScene:
         """Look from the side, from above, from in front and above, or follow the tool."""
         if view != FOLLOW:
             names = ("x", "y", "z", "look_at_x", "look_at_y", "look_at_z")
-            eye, target = self._shape.middle + EYES[view], self._shape.middle + _TARGET
+            eye, target = self._shape.eye(view), self._shape.middle + TARGET
             places = dict(zip(names, (*eye.tolist(), *target.tolist()), strict=True))
             self.scene.move_camera(**places, duration=0.3)
         ui.run_javascript(f"armtempo.follow = {json.dumps(view == FOLLOW)}")

@@ -52,7 +52,10 @@ class BoardTab:
         self._tested: SelfTest | None = None
         ui.label(words.STATUS).classes("text-subtitle2")
         columns = [{"name": name, "label": "", "field": name, "align": "left"} for name in ("key", "value")]
-        self._state = ui.table(columns=columns, rows=[]).props("dense flat hide-header wrap-cells")
+        self._state = ui.table(columns=columns, rows=[]).props(
+            "dense flat hide-header hide-bottom wrap-cells"
+        )
+        self._no_board = ui.label(words.NO_BOARD).classes("armtempo-note")
         ui.label(words.STORED).classes("text-subtitle2")
         self._stored = ui.column()
         ui.label(words.PROGRAM).classes("text-subtitle2")
@@ -77,6 +80,7 @@ class BoardTab:
 
     def _look(self) -> None:
         state = self._operator.live.state
+        self._no_board.set_visibility(state is None)
         if state is not None:
             values = asdict(state)
             rows = [
@@ -119,6 +123,8 @@ class BoardTab:
                 return
             self._stored.clear()
             with self._stored:
+                if not motions:
+                    ui.label(words.NOTHING_STORED).classes("armtempo-note")
                 for motion in motions:
                     self._row(motion)
 

@@ -69,7 +69,9 @@ class JobTab:
         grid = ui.element("div").classes("armtempo-grid").style(f"grid-template-columns: {columns}")
         with grid:
             for text in ("", "", *(joint.labelled for joint in joints), ""):
-                ui.label(words.plain(text)).classes("text-caption ellipsis")
+                ui.label(words.plain(text)).classes("text-caption ellipsis").props["title"] = words.plain(
+                    text
+                )
         build_rows(grid, len(self._jobs.vias), self._row)
         with ui.row():
             ui.button(

@@ -156,7 +156,7 @@ class MoveTab:
     def _pair(self, name: str, move: JogMove, frame: str = JOINTS) -> None:
         """Minus, name, plus."""
         self._jog(replace(move, by=-move.by), "−", name, frame)
-        ui.label(words.plain(name)).classes("armtempo-name ellipsis")
+        ui.label(words.plain(name)).classes("armtempo-name ellipsis").props["title"] = words.plain(name)
         self._jog(move, "+", name, frame)
 
     def _jog(self, move: JogMove, sign: str, name: str, frame: str) -> None:

@@ -251,6 +251,7 @@ STATE_KEYS = {
 }
 STATUS, LOG, TRAFFIC = "Status", "Log", "Traffic"
 RENAME, REMOVE, NEW_NAME = "Rename", "Remove", "New name"
+NOTHING_STORED = "Nothing is stored on the board."
 A_SEQUENCE, A_PROGRAM, BY_BUTTON = "sequence", "program", " · started by the board's button"
 SURE_REMOVE = "Remove {name} from the board?"
 SELFTEST, SURE_SELFTEST = (

@@ -142,6 +142,22 @@ def test_the_views_hold_an_arm_anywhere_on_its_rail(low: float, high: float) -> 
         assert np.linalg.norm(away, axis=1).max() <= 1.0
 
 
+@pytest.mark.parametrize("name", ["paper", "ar4", "scara", "moveo"])
+def test_the_views_hold_the_home_posture(name: str) -> None:
+    """In a picture as high as it is wide, of 75 degrees, which is that of the scene's camera."""
+    arm = Arm.of(name)
+    shape = ArmShape(arm)
+    points = shape.outline(np.array(arm.home_deg))
+    target = shape.middle + arm_scene.TARGET
+    for view in ("side", "top", "free"):
+        eye = shape.eye(view)
+        ahead = (target - eye) / np.linalg.norm(target - eye)
+        right = np.cross(ahead, (0.0, 0.0, 1.0))
+        right /= np.linalg.norm(right)
+        seen = (points - eye) @ np.stack([right, np.cross(right, ahead), ahead], axis=1)
+        assert (np.abs(seen[:, :2]) < np.tan(np.radians(37.5)) * seen[:, 2:]).all(), view
+
+
 def test_the_view_from_above_is_aligned_with_the_axes() -> None:
     x, y, z = arm_scene.EYES["top"]
     assert x == 0.0

@@ -44,6 +44,18 @@ def test_what_another_program_stores_is_shown(operator: PanelBoard) -> None:
         assert not any(text.startswith("feed · ") for text in page.texts())
 
 
+def test_what_is_empty_says_so(operator: PanelBoard) -> None:
+    operator.board.stored = []  # type: ignore[attr-defined]
+    with pages(operator) as page:
+        page.show(words.TAB_BOARD)
+        page.look()
+        assert words.NO_BOARD in page.texts()
+        opened(page)
+        page.act(page.of.refresh)
+        assert words.NOTHING_STORED in page.texts()
+        assert words.NO_BOARD not in page.texts()
+
+
 def test_stored_motions_are_run_renamed_and_removed(operator: PanelBoard) -> None:
     with pages(operator) as page:
         board = opened(page)
