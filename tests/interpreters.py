@@ -62,3 +62,7 @@ def run(name: str, script: Path | str, *arguments: str, timeout: float = 1200.0,
 def environment_of_others() -> dict[str, str]:
     """For a program that is not ours, such as pip: its deprecation warnings are no errors there."""
     return {name: value for name, value in os.environ.items() if name != "PYTHONWARNINGS"}
+
+
+if __name__ == "__main__":  # python -m tests.interpreters NAME SCRIPT [ARGUMENTS]
+    print(run(*sys.argv[1:]), end="")

@@ -1,4 +1,4 @@
-"""Scripts of cases for several interpreters as tests: one test for each case, each in an interpreter of its own.
+"""Scripts of cases for several interpreters as tests: one test for each script and interpreter, or for each case.
 
 A comment behind ``def case_…():`` says where a case runs: ``slow``, ``slow on CPython``, ``not emulated``, ``not on
 CPython``. A line ``# all cases: …`` says it of a whole script, and ``emulated`` or ``on CPython`` makes an exception.
@@ -91,12 +91,12 @@ def _marks(case: Case) -> list[pytest.MarkDecorator]:
 
 
 def together(found: Iterable[Case]) -> list[Case]:
-    """The cases, those of a script in one process if that is the emulator, which takes long to start.
+    """The cases, those of a script that are marked alike in one process: its start takes longer than most of them.
 
-    The other interpreters run each case by itself; the output of a script ends with the case that did not hold.
+    The output of a script ends with the case that did not hold.
     """
-    kept: dict[tuple[str, Path, str], list[str]] = {}
+    kept: dict[tuple[object, ...], list[str]] = {}
     for case in found:
-        alone = "" if case.interpreter == EMULATED else case.name
-        kept.setdefault((case.interpreter, case.script, alone), []).append(case.name)
-    return [Case(name, script, " ".join(named)) for (name, script, _), named in kept.items()]
+        marks = tuple(mark.name for mark in _marks(case))
+        kept.setdefault((case.interpreter, case.script, marks), []).append(case.name)
+    return [Case(name, script, " ".join(named)) for (name, script, _), named in kept.items()]  # type: ignore[arg-type]

@@ -20,7 +20,7 @@ from pathlib import Path
 from armtempo.basics.arguments import checked
 from armtempo.basics.errors import RunFolderError
 from armtempo.basics.progress import Progress, part
-from armtempo.encoding import planned_for
+from armtempo.encoding import made_with
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -102,7 +102,7 @@ def load(path: Path | str, arm: Arm | None = None, altered: bool = False) -> Pla
     """
     found = Plan.load(path, altered)
     if arm is not None:
-        planned_for.check(path, found, arm)
+        made_with.check_plan(path, found, arm)
     return found
 
 

@@ -22,14 +22,14 @@ from typing import Any
 
 import armtempo_board
 import numpy as np
-from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended, opener
+from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended
 from armtempo_board.app.pallet import Place
-from armtempo_shared.program import EACH, MARK
+from armtempo_shared.program import EACH, FREE, MARK, STILL
 from armtempo_shared.rest_to_rest import PERCENT
 from armtempo_shared.sequence import MAX_COUNTERS
 
 from armtempo.basics.errors import InputError
-from armtempo.encoding import encode, encoded_program, planned_for
+from armtempo.encoding import encode, encoded_program, made_with
 from armtempo.model.arm import Arm
 from armtempo.model.plan import Plan
 from armtempo.model.user_program import UserProgram
@@ -98,9 +98,11 @@ def run(
     names = {
         "__name__": "__main__",
         "print": work.print,
-        "open": opener(work),
+        "open": cell.opened,
         MARK: cell.at,
         EACH: cell.each,
+        STILL: cell.still,
+        FREE: cell.free,
     }
     before = vars(armtempo_board).get("cell")
     armtempo_board.cell = cell
@@ -111,6 +113,7 @@ def run(
     except SystemExit:
         pass
     finally:
+        cell.close_files()
         armtempo_board.cell = before  # type: ignore[assignment]
     return work.run
 
@@ -201,7 +204,7 @@ class _Work:
         if not file.is_file():
             raise InputError(f"no motion {name!r}: {file} does not exist", "plan it")
         plan = Plan.load_motion(file)
-        planned_for.check(file, plan, self._arm)
+        made_with.check_plan(file, plan, self._arm)
         motion = plan.trajectory
         start = self._arm.transmission.whole_steps(motion(0.0))
         off = np.abs(np.subtract(start, self._steps))

@@ -9,7 +9,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError, PlanError
-from armtempo.encoding import decode, encode, engine_heap
+from armtempo.encoding import encode, engine_heap
 from armtempo.encoding.engine_heap import CORE, IN_FIRMWARE, EngineHeap
 from armtempo.model.arm import Arm
 from armtempo.model.parts import Limits
@@ -201,11 +201,11 @@ def test_backwards_mirrors_time() -> None:
 def test_records_read_back() -> None:
     motion = point_to_point.straight("x", START, END, ARM)
     data = encode.motion_record(motion, ARM)
-    found = decode.trajectory(data, ARM.transmission, "x")
+    found = encode.decoded(data, ARM.transmission, "x")
     times = np.linspace(0.0, motion.duration_s, 101)
     np.testing.assert_allclose(found(times), motion(times), atol=1e-7)
     with pytest.raises(InputError, match="not a motion record"):
-        decode.trajectory(data[:-1], ARM.transmission, "x")
+        encode.decoded(data[:-1], ARM.transmission, "x")
 
 
 def six_joints() -> Arm:

@@ -21,7 +21,7 @@ from armtempo.cli import LazyGroup, state
 from armtempo.cli.help import TOPICS, page
 from armtempo.link.refusal import describe_notice, refusal
 from armtempo.link.transport import SerialTransport
-from armtempo.robot import board_state, speed
+from armtempo.robot import board_state, running
 from armtempo.robot.board import Board
 from armtempo_shared import codes, wire
 from armtempo_shared.limits import MAX_MOTION_BYTES
@@ -276,10 +276,10 @@ def test_a_board_that_takes_nothing_is_not_waited_for_forever() -> None:
 
 
 def test_a_speed_is_1_to_100_percent() -> None:
-    assert [speed.permille(fraction) for fraction in (0.01, 1.0)] == [10, 1000]
+    assert [running.permille(fraction) for fraction in (0.01, 1.0)] == [10, 1000]
     for fraction in (0.009, 1.001):
         with pytest.raises(InputError, match=r"give a fraction of 0\.01 to 1"):
-            speed.permille(fraction)
+            running.permille(fraction)
 
 
 @pytest.mark.long

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.model.job import Job
-from armtempo.planning import interval_search, limit_rows, planner, time_parameterization
-from armtempo.planning.fixed_path import FixedPath
-from armtempo.planning.path_rows import Rows
+from armtempo.planning import limit_rows, planner, time_parameterization
+from armtempo.planning.fixed_path import FixedPath, Rows
 from armtempo.planning.time_parameterization import Group
 from armtempo.splines import bspline, trajectory
 
@@ -57,7 +56,7 @@ def test_polished_plan_is_the_best_known_to_1e_6(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.seeds(0, 1)
 def test_gradients_never_make_it_worse(seed: int) -> None:
     rng = np.random.default_rng(seed)
     points = bspline.fit(rng.normal(0, 40, (int(rng.integers(2, 9)), 2)), 5)
@@ -166,7 +165,7 @@ def uneven() -> tuple[np.ndarray, list[object]]:
 
 def test_bounds_follow_from_the_job() -> None:
     via, limits = uneven()
-    box = interval_search.bounds_s(bspline.fit(via, 5), 5, limits)
+    box = time_parameterization.bounds_s(bspline.fit(via, 5), 5, limits)
     assert box[0, 1] / box[1, 0] > 30.0
 
 
@@ -177,11 +176,11 @@ def test_a_search_that_no_bound_holds_back_is_made_once(monkeypatch: pytest.Monk
     def once(points: object, limits: object, job: object, box: np.ndarray, *others: object) -> object:
         boxes.append(box)
         inside: Any = SimpleNamespace(x=np.sqrt(box[:, 0] * box[:, 1]), value=1.0)
-        return interval_search.Found(inside, np.empty(0))
+        return time_parameterization.Found(inside, np.empty(0))
 
-    monkeypatch.setattr(interval_search, "_once", once)
+    monkeypatch.setattr(time_parameterization, "_once", once)
     job = Job("uneven", tuple(map(tuple, via.tolist())), optimiser="acs", path="through")
-    found = interval_search.search(
+    found = time_parameterization.search(
         bspline.fit(via, 5), limits, job, np.random.default_rng(0), lambda done, whole: None
     )
     assert len(boxes) == 1
@@ -197,7 +196,7 @@ def test_bounds_that_hold_the_search_back_are_widened_and_named(monkeypatch: pyt
     given = planner.plan(arm, replace(job, bounds_s=(20.0, 21.0), polish=False))
     assert any("ended at bounds_s" in note for note in given.notes)
     assert given.total_s > 1.001 * best
-    monkeypatch.setattr(interval_search, "_REACH", 1.05)
+    monkeypatch.setattr(time_parameterization, "_REACH", 1.05)
     held = planner.plan(arm, job)
     assert any("they were widened 6 times" in note for note in held.notes)
     assert held.total_s == pytest.approx(best, rel=1e-3)

@@ -16,7 +16,6 @@ from armtempo.model.parts import Limits
 from armtempo.planning import (
     brake_time,
     dual_bound,
-    dual_value,
     lower_bounds,
     planner,
     point_to_point,
@@ -145,7 +144,7 @@ def test_whatever_the_multipliers_the_bound_is_below_every_motion(seed: int) -> 
     scattered = (
         each * np.exp(rng.normal(0, 0.3, each.shape)) for each in (best.jerk, best.acceleration, best.speed)
     )
-    assert dual_value.value(cells, Multipliers(*scattered)) * unit_s <= 7.2268, f"seed {seed}"
+    assert lower_bounds.value(cells, Multipliers(*scattered)) * unit_s <= 7.2268, f"seed {seed}"
 
 
 def random_motion(seed: int, most: int = 25) -> tuple[Arm, Job]:

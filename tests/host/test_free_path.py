@@ -17,7 +17,7 @@ from armtempo.model.tool_pose import Pose
 from armtempo.optimise.reduced_kkt import ReducedFactor, ReducedKkt
 from armtempo.planning import checks, collocation, motion_program, planner, rest_to_rest
 from armtempo.planning.collocation import Curve, Ratios
-from armtempo.planning.free import corridor, free_path, free_start
+from armtempo.planning.free import free_path, free_start
 from armtempo.planning.free.angle_bounds import AngleRows
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Improver, Tolerance
 from armtempo.planning.limit_rows import LimitRows
@@ -84,7 +84,7 @@ def test_what_stops_would_keep_is_not_refused(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pieces", [3, 4])
+@pytest.mark.parametrize("pieces", [3, pytest.param(4, marks=pytest.mark.long)])
 def test_one_dwell_after_the_other_on_few_pieces(pieces: int) -> None:
     """No control point is held by two dwells, which lie five pieces apart at least."""
     plan = planner.plan(ARM, replace(FEED, refine=pieces, stops=(Stop(1, 0.5), Stop(2, 0.5))))
@@ -214,13 +214,13 @@ def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
     assert plan.total_s == planner.plan(ARM, replace(FEED, path="through", refine="auto")).total_s
     assert any("no faster path" in note for note in plan.notes)
     assert faults(plan) == []
-    assert max(seen) <= 3 * corridor._MOST_PIECES
+    assert max(seen) <= 3 * free_path._MOST_PIECES
     assert 'with refine = 6; try refine = "auto" (--refine auto)' in plan.notes[-1]
     assert len(seen) < 500
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", [2.0, 20.0])
+@pytest.mark.parametrize("width", [2.0, pytest.param(20.0, marks=pytest.mark.long)])
 def test_a_corridor_of_the_tool_that_the_stops_leave_no_room_in_is_refused(width: float) -> None:
     """The spline through the via points does not rest there, and a motion that is drawn to it would not either."""
     with pytest.raises(PlanError, match=rf"no path could be proven to stay within corridor_mm = {width:g}\b"):
@@ -358,8 +358,8 @@ def test_the_tools_deviation_is_bounded_sharply(away_deg: float, linkage: bool) 
         tool.at(np.einsum("ku,skj->suj", at, pieces).reshape(-1, 3)).position_mm for pieces in (path, through)
     ]
     reached = np.linalg.norm(places[0] - places[1], axis=1).max()
-    bound = corridor.tool_deviation_mm(path, through, tool)
-    assert reached <= bound <= reached * (1.0 + 2.0 * corridor.SHARP) + 1e-6
+    bound = free_path.deviation_mm(path, through, tool)
+    assert reached <= bound <= reached * (1.0 + 2.0 * free_path.SHARP) + 1e-6
 
 
 @pytest.mark.slow

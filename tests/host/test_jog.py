@@ -175,7 +175,7 @@ def test_a_held_jog_comes_close_to_the_optimum(name: str) -> None:
 def test_a_held_jog_goes_never_less_far_at_a_higher_speed(name: str) -> None:
     arm = Arm.load(name)
     for joint in range(len(arm.driven)):
-        ways = np.array([held(arm, joint, percent / 100) for percent in range(1, 101)])
+        ways = np.array([held(arm, joint, percent / 100) for percent in (*range(1, 100, 4), 100)])
         assert np.diff(ways, axis=0).min() >= -1e-9
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
-from armtempo.kinematics import forward, pose_file
+from armtempo.cli import kinematics
+from armtempo.kinematics import forward
 from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.descent import PoseProblem, _posture, _system
 from armtempo.kinematics.forward import Frame
@@ -115,7 +116,7 @@ def test_file_of_poses_in_every_form(tmp_path: Path) -> None:
         f"{' '.join(map(repr, map(float, MATRIX[:3].ravel())))}\n"
         f"{' '.join(map(repr, map(float, MATRIX.ravel())))}\n"
     )
-    poses = pose_file.read(file)
+    poses = kinematics.read(file)
     assert len(poses) == 4
     for found in poses:
         np.testing.assert_allclose(found.matrix, MATRIX, atol=1e-14)
@@ -125,7 +126,7 @@ def test_file_of_poses_in_every_form(tmp_path: Path) -> None:
 def test_a_line_may_leave_angles_free(tmp_path: Path) -> None:
     file = tmp_path / "poses.txt"
     file.write_text("1 2 3\n1 2 3 - -90 -\n1, 2, 3, 5, -90, -\n1 2 3 - - 20\n1 2 3 - - -\n")
-    poses = pose_file.read(file)
+    poses = kinematics.read(file)
     assert [each.fixed for each in poses] == [(), ("pitch",), ("roll", "pitch"), ("yaw",), ()]
     assert [each.constraints for each in poses] == [3, 4, 5, 4, 3]
     np.testing.assert_allclose(poses[1].matrix, pose.from_rpy((1, 2, 3), (0, -90, 0)))
@@ -151,13 +152,13 @@ def test_a_wrong_file_is_refused_with_line_and_reason(tmp_path: Path, content: b
     file = tmp_path / "poses.txt"
     file.write_bytes(content)
     with pytest.raises(InputError, match=r"poses\.txt") as caught:
-        pose_file.read(file)
+        kinematics.read(file)
     assert words in str(caught.value)
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
-        pose_file.read(tmp_path / "none.txt")
+        kinematics.read(tmp_path / "none.txt")
 
 
 # what a target asks of the tool: how far a tool is from it, and the derivatives that the descent goes by

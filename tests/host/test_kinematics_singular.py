@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from armtempo.kinematics import forward, inverse
-from armtempo.kinematics.regions import classify
+from armtempo.kinematics.closed_form import classify
 from armtempo.kinematics.shape import Shape
 from armtempo.kinematics.solutions import (
     DUPLICATE,

@@ -283,7 +283,7 @@ def test_a_hundred_uploads_over_a_bad_line_arrive_identical(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.seeds(0, 1, 2)
 def test_runs_over_a_bad_line_are_complete(tmp_path: Path, seed: int) -> None:
     pipe = Pipe(tmp_path / "flash", Noise(f"to {seed}", 0.01), Noise(f"from {seed}", 0.01))
     samples, end = follow(started(pipe))

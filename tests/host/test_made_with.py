@@ -11,7 +11,7 @@ import armtempo
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import stored
-from armtempo.encoding import encoded_plan, encoded_program, made_with, planned_for
+from armtempo.encoding import encoded_plan, encoded_program, made_with
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.plan import Plan
@@ -97,11 +97,11 @@ def test_a_plan_and_a_stored_motion_are_old_if_what_they_use_has_changed(
     assert Motion(data).joints == 6
     made_with.check_stored("j", data, arm(tmp_path))
     if not said:
-        planned_for.check("j.json", plan, now)
+        made_with.check_plan("j.json", plan, now)
         made_with.check_stored("j", data, now)
         return
     with pytest.raises(InputError, match=said):
-        planned_for.check("j.json", plan, now)
+        made_with.check_plan("j.json", plan, now)
     with pytest.raises(InputError, match=f"'j' on the board is old: {said}"):
         made_with.check_stored("j", data, now)
 

@@ -15,7 +15,7 @@ from armtempo.model.arm import Arm
 from armtempo.model.job import Job, Stop
 from armtempo.model.tool_pose import Pose
 from armtempo.model.tool_segment import ToolSegment
-from armtempo.planning import near_points, planner
+from armtempo.planning import planner
 
 ARM = Arm.paper()
 STEP = 1.0 / ARM.driven[0].steps_per_deg
@@ -54,7 +54,7 @@ def test_a_spline_passes_them_as_one_and_says_so() -> None:
     ],
 )
 def test_which_are_one(via: tuple[tuple[float, ...], ...], groups: list[list[int]]) -> None:
-    job, _, notes = near_points.merged(ARM, Job("some", via=via), np.array(via))
+    job, _, notes = planner.merged(ARM, Job("some", via=via), np.array(via))
     last = len(via) - 1
     assert job.via == tuple(via[last if last in group else group[0]] for group in groups)
     assert len(notes) == sum(len(group) > 1 for group in groups)
@@ -63,26 +63,26 @@ def test_which_are_one(via: tuple[tuple[float, ...], ...], groups: list[list[int
 def test_no_other_job_is_changed() -> None:
     job = Job.paper()
     via, _ = planner.via_angles(ARM, job)
-    assert near_points.merged(ARM, job, via).job is job
+    assert planner.merged(ARM, job, via).job is job
 
 
 def test_stops_stay_and_rests_add_up() -> None:
     via = (HERE, THERE, beside(THERE), END, HERE)
     job = Job("rests", via=via, stops=(Stop(1, 0.5), Stop(2, 0.25), Stop(3)))
-    found, _, notes = near_points.merged(ARM, job, np.array(via))
+    found, _, notes = planner.merged(ARM, job, np.array(via))
     assert found.stops == (Stop(1, 0.75), Stop(2))
     assert "with 0.75 s of rest" in notes[0]
-    assert near_points.merged(ARM, replace(job, stops=(Stop(2),)), np.array(via)).job.stops == (Stop(1),)
+    assert planner.merged(ARM, replace(job, stops=(Stop(2),)), np.array(via)).job.stops == (Stop(1),)
 
 
 def test_a_stop_at_an_end_is_not_lost() -> None:
     via = (HERE, beside(HERE), END)
-    assert not near_points.merged(ARM, Job("ends", via=via, stops=(Stop(1),)), np.array(via)).job.stops
+    assert not planner.merged(ARM, Job("ends", via=via, stops=(Stop(1),)), np.array(via)).job.stops
     with pytest.raises(InputError, match="so they are one point, but the dwell_s of P1 is not at an end"):
-        near_points.merged(ARM, Job("ends", via=via, stops=(Stop(1, 1.0),)), np.array(via))
+        planner.merged(ARM, Job("ends", via=via, stops=(Stop(1, 1.0),)), np.array(via))
     back = via[::-1]
     with pytest.raises(InputError, match=r"P1 and P2 .* dwell_s of P1"):
-        near_points.merged(ARM, Job("ends", via=back, stops=(Stop(1, 1.0),)), np.array(back))
+        planner.merged(ARM, Job("ends", via=back, stops=(Stop(1, 1.0),)), np.array(back))
 
 
 @pytest.mark.parametrize(
@@ -107,9 +107,9 @@ def test_what_is_asked_of_the_tool_stays(
     job = Job("tool", via=via, tool_segments=segments)
     if message:
         with pytest.raises(InputError, match=message):
-            near_points.merged(ARM, job, np.array(via))
+            planner.merged(ARM, job, np.array(via))
         return
-    found = near_points.merged(ARM, job, np.array(via)).job
+    found = planner.merged(ARM, job, np.array(via)).job
     assert found.tool_segments == (ToolSegment(1, **before), ToolSegment(2, line=True))  # type: ignore[arg-type]
 
 
@@ -117,11 +117,11 @@ def test_circles_and_wide_poses_are_no_such_points() -> None:
     via = (HERE, THERE, beside(THERE), END)
     circle = ToolSegment(2, line=True, circle_through_mm=((1.0, 2.0, 3.0), (3.0, 2.0, 1.0)))
     job = Job("circle", via=via, tool_segments=(circle,))
-    assert near_points.merged(ARM, job, np.array(via))[0] is job
+    assert planner.merged(ARM, job, np.array(via))[0] is job
     pose = Pose(matrix=tuple(map(tuple, np.eye(4).tolist())), tolerance_mm=5.0, tolerance_deg=5.0)
     wide = Job("wide", via=(HERE, pose, beside(THERE), END))
-    assert near_points.merged(ARM, wide, np.array(via))[0] is wide
-    assert len(near_points.merged(ARM, replace(wide, path="through"), np.array(via)).job.via) == 3
+    assert planner.merged(ARM, wide, np.array(via))[0] is wide
+    assert len(planner.merged(ARM, replace(wide, path="through"), np.array(via)).job.via) == 3
 
 
 def test_a_job_is_split_at_its_merged_stops() -> None:
@@ -144,4 +144,4 @@ def test_a_recording_that_creeps_is_thinned_to_points_that_stay(tmp_path: Path) 
     np.savetxt(file, table, delimiter=",", header="time_s,joint 1,joint 2,joint 3", comments="", fmt="%.6f")
     job = Job.from_csv(file, ARM, tolerance_deg=0.02)
     via, _ = planner.via_angles(ARM, job)
-    assert near_points.merged(ARM, job, via).job is job
+    assert planner.merged(ARM, job, via).job is job

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.cli.results import ProgressBar
-from armtempo.cli.run_progress import RunProgress
+from armtempo.cli.run import RunProgress
 from armtempo.cli.sequences import StateLine
 from armtempo.encoding import encoded_plan
 from armtempo.kinematics import chain

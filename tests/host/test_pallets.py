@@ -14,7 +14,7 @@ from armtempo.basics import json_codec
 from armtempo.basics.errors import InputError, LinkError, PlanError
 from armtempo.cli import sequences
 from armtempo.diagnosis import geometry
-from armtempo.encoding import encode, encoded_plan, flash_use, planned_for
+from armtempo.encoding import encode, encoded_plan, flash_use, made_with
 from armtempo.kinematics.of_arm import forward
 from armtempo.link.board_messages import StoredMotion
 from armtempo.model import shipped
@@ -25,7 +25,6 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.steps import EachPlace, ToPlace
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import planner, point_to_point, via_points
-from armtempo.planning.pallet_places import resolve
 from armtempo.robot import store
 
 ARM_TEXT = shipped.find("ar4").path.read_text(encoding="utf-8")
@@ -266,19 +265,19 @@ def test_the_solutions_of_all_places_are_near_each_other() -> None:
     ar4 = Arm.load("ar4")
     first = Pose.of_matrix(forward(ar4, [10, 10, 20, 170, 40, -150]))
     pallet = ArmPallet("tray", first, rows=3, columns=3, row_mm=20.0, column_mm=-15.0)
-    above = np.array([place.above_deg for place in resolve(ar4, pallet)])
+    above = np.array([place.above_deg for place in via_points.places(ar4, pallet)])
     assert np.abs(np.diff(above, axis=0)).max() < 30.0
 
 
 def test_one_that_has_changed_makes_a_plan_old(tmp_path: Path, quick: None) -> None:
     plan = planned(tmp_path, more=SMALL)
-    planned_for.check("s.json", plan, arm(tmp_path, SMALL))
+    made_with.check_plan("s.json", plan, arm(tmp_path, SMALL))
     with pytest.raises(InputError, match=r"s.json is old: pallet 'tray' has changed since"):
-        planned_for.check("s.json", plan, arm(tmp_path, SMALL.replace("column_mm = 12", "column_mm = 13")))
+        made_with.check_plan("s.json", plan, arm(tmp_path, SMALL.replace("column_mm = 12", "column_mm = 13")))
     with pytest.raises(InputError, match="pallet 'tray' has changed since, or is gone"):
-        planned_for.check("s.json", plan, arm(tmp_path, SMALL.replace("[pallet.tray]", "[pallet.other]")))
+        made_with.check_plan("s.json", plan, arm(tmp_path, SMALL.replace("[pallet.tray]", "[pallet.other]")))
     with pytest.raises(InputError, match="frame 'tray' has changed since"):
-        planned_for.check("s.json", plan, arm(tmp_path, SMALL.replace("330", "331")))
+        made_with.check_plan("s.json", plan, arm(tmp_path, SMALL.replace("330", "331")))
 
 
 class Flash:
@@ -359,7 +358,7 @@ def test_a_step_changes_the_tool_of_the_motions_after_it(tmp_path: Path, quick: 
     assert tools_of(Plan.load(tmp_path / "s.json")) == tools_of(plan)
     changed = arm(tmp_path, SMALL + TOOLS.replace("[0, 0, 10]", "[0, 0, 11]"))
     with pytest.raises(InputError, match=r"s.json is old: tool 'pen' has changed since, or is gone"):
-        planned_for.check("s.json", plan, changed)
+        made_with.check_plan("s.json", plan, changed)
 
 
 def test_a_tool_that_changes_in_a_repeat_makes_its_first_pass_another(tmp_path: Path, quick: None) -> None:

@@ -7,7 +7,7 @@ import random
 
 import numpy as np
 import pytest
-from armtempo.encoding import decode, encode
+from armtempo.encoding import encode
 from armtempo.model.arm import Arm
 from armtempo.planning import brake_time, point_to_point
 from armtempo.splines import extremes
@@ -70,7 +70,7 @@ def test_random_moves_keep_their_limits_and_end_where_they_should(seed: int) -> 
         arm = rng.choice(ARMS)
         start, target = random_ends(rng, arm)
         data = record(arm, start, target)
-        found = decode.trajectory(data, arm.transmission, "move")
+        found = encode.decoded(data, arm.transmission, "move")
         for joint, spline, most, begin, end in zip(
             arm.driven, found.joints, extremes.of_joints(found.joints), start, target, strict=True
         ):
@@ -89,7 +89,7 @@ def test_braking_and_changes_of_speed_keep_what_they_may(seed: int) -> None:
     for _ in range(3):
         arm = rng.choice(ARMS)
         data = record(arm, *random_ends(rng, arm))
-        found = decode.trajectory(data, arm.transmission, "move")
+        found = encode.decoded(data, arm.transmission, "move")
         starts = every_start(found, 31)
         allowed = [joint.limits for joint in arm.driven]
         to_rest, others = brakes_of(data, found, starts)
@@ -107,7 +107,7 @@ def test_they_take_little_more_time_than_the_hosts_moves(share: float) -> None:
         start = [low + 0.05 * (high - low) for low, high in (joint.range_deg for joint in arm.driven)]
         end = [low + (0.05 + share) * (high - low) for low, high in (joint.range_deg for joint in arm.driven)]
         data = record(arm, steps(arm, start), steps(arm, end))
-        taken_s = decode.trajectory(data, arm.transmission, "move").duration_s
+        taken_s = encode.decoded(data, arm.transmission, "move").duration_s
         hosts_s = point_to_point.straight("m", start, end, arm).duration_s
         print(f"{arm.name}, {share:g} of the ranges: {taken_s:.3f} s, the host's {hosts_s:.3f} s")
         assert taken_s <= 1.25 * hosts_s

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli.jog_screen import JogScreen
-from armtempo.cli.taught_points import NamedPoints
+from armtempo.cli.teach import NamedPoints
 from armtempo.model import taught, taught_frame
 from armtempo.model.arm import Arm
 from armtempo.model.tool_pose import Pose

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from armtempo.cli import main
-from armtempo.cli.taught_points import NamedPoints
+from armtempo.cli.teach import NamedPoints
 from armtempo.model import taught_tool
 from armtempo.model.arm import Arm
 from armtempo.model.tool import ArmTool

@@ -13,7 +13,7 @@ from armtempo import pipeline
 from armtempo.basics import json_codec, toml_table
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.encoding import encode, planned_for
+from armtempo.encoding import encode, made_with
 from armtempo.kinematics import dynamics
 from armtempo.kinematics.forward import forward as of_geometry
 from armtempo.kinematics.geometry import Geometry
@@ -269,7 +269,7 @@ def test_a_job_chooses_its_tool_and_a_plan_is_old_without_it(tmp_path: Path) -> 
         pipeline.load(tmp_path / "plan.json", changed)
     with pytest.raises(InputError, match=r"job.toml: tool: .* no tool 'griper'; did you mean 'gripper'"):
         Job.of_table(toml_table.parse(text.replace("gripper", "griper"), "job.toml"), arm)
-    planned_for.check("x", replace(plan, arm=arm), changed)
+    made_with.check_plan("x", replace(plan, arm=arm), changed)
 
 
 @pytest.mark.slow

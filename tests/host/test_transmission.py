@@ -13,7 +13,7 @@ import pytest
 from armtempo.basics.errors import InputError
 from armtempo.diagnosis.arm_check import check_arm
 from armtempo.diagnosis.finding import Level
-from armtempo.encoding import decode, encode
+from armtempo.encoding import encode
 from armtempo.model import arm_json, drive_limits, shipped
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
@@ -207,7 +207,7 @@ def test_a_planned_motion_as_the_board_reads_it(path: str) -> None:
     wanted *= np.array([[joint.motor.steps_per_deg] for joint in THOR.driven])
     np.testing.assert_allclose(points, wanted, atol=1e-6)
     times = np.linspace(0.0, plan.trajectory.duration_s, 101)
-    back = decode.trajectory(data, THOR.transmission, "wrist")
+    back = encode.decoded(data, THOR.transmission, "wrist")
     np.testing.assert_allclose(back(times), plan.trajectory(times), atol=1e-6)
     most = np.abs(plan.trajectory(times, 1)).max(axis=0)
     assert np.all(most <= [20.0 * (1 + 1e-9)] * 6)

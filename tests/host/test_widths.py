@@ -26,8 +26,7 @@ READ_BY_PROGRAMS = {
     "panel.py": 1,  # an address
     "results.py": 3,
     "sequences.py": 2,  # a line that is written again and again
-    "taught_points.py": 1,  # TOML
-    "teach.py": 1,  # a line that is written again and again
+    "teach.py": 2,  # TOML, and a line that is written again and again
     "virtual_board.py": 1,  # a path
 }
 """Files that print without ``results.echo``, and how often."""

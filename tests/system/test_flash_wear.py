@@ -14,7 +14,7 @@ from armtempo.model.arm import Arm
 from armtempo.planning import point_to_point
 from armtempo.robot.connect import connect
 from armtempo.robot.store import store
-from armtempo.simulator import LaunchOptions, launch, wear
+from armtempo.simulator import LaunchOptions, launch, launcher
 
 from tests import scripted
 from tests.system import commandline
@@ -97,4 +97,4 @@ def test_status_shows_erasures_and_moves_add_none(tmp_path: Path) -> None:
 def test_a_virtual_board_in_another_terminal_shows_them_too(tmp_path: Path) -> None:
     with launch(LaunchOptions(tmp_path / "flash")) as process, connect(process.port) as board:
         assert board.state().erasures
-    assert not wear.erasures(process.port)
+    assert not launcher.erasures(process.port)

@@ -19,8 +19,7 @@ import numpy as np
 import pytest
 from armtempo.basics.errors import InputError
 from armtempo.cli import main
-from armtempo.cli.taught_points import TaughtPoints
-from armtempo.cli.teach import by_hand
+from armtempo.cli.teach import TaughtPoints, by_hand
 from armtempo.link.board_messages import Notice
 from armtempo.model import shipped
 from armtempo.simulator import LaunchOptions, launch

@@ -12,23 +12,22 @@ import click
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, PlanError
 from armtempo.basics.text import aligned
 from armtempo.cli import options, posture, resolve, results, typed_pose
 from armtempo.cli.results import show_json
 from armtempo.cli.typed_pose import TypedPose
-from armtempo.kinematics import pose_file
 from armtempo.kinematics.chain import spread_deg
 from armtempo.kinematics.forward import all_frames
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.listing import Listing, listings, tool_values
-from armtempo.kinematics.pose_file import numbers
 from armtempo.kinematics.ranges import Ranges
 from armtempo.kinematics.rejection import out_of_range
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
-from armtempo.model.pose import to_quaternion, to_rpy_deg
-from armtempo.model.tool_pose import BASE, Pose
+from armtempo.model.pose import LARGEST, checked, from_quaternion, to_quaternion, to_rpy_deg
+from armtempo.model.tool_pose import BASE, WHOLE, Pose
 
 
 @click.command("ik")
@@ -104,9 +103,9 @@ def _poses(matrix: str | None, poses: Path | None, typed: TypedPose) -> list[Pos
     if (pose := typed.pose()) is not None:
         return [pose]
     if poses is not None:
-        return pose_file.read(poses)
+        return read(poses)
     assert matrix is not None
-    return [pose_file.parse(matrix, "--matrix", (12, 16))]
+    return [parse(matrix, "--matrix", (12, 16))]
 
 
 def _posture(previous: str | None, solver: PoseSolver) -> Sequence[float]:
@@ -257,3 +256,68 @@ def _outside(arm: Arm, angles_deg: Array) -> list[str]:
 
 def _number(value: float) -> str:
     return f"{round(value, 4) + 0.0:.4f}"
+
+
+# a file of poses
+FORMS = {
+    3: "x y z: position only",
+    6: "x y z roll pitch yaw, with - for an angle that is free",
+    7: "x y z and quaternion w x y z",
+    12: "3 rows of a matrix",
+    16: "4 rows of a matrix",
+}
+"""How many numbers make a pose."""
+
+FREE = "-"
+
+
+def read(path: Path | str) -> list[Pose]:
+    """Return the poses of a file; InputError names the file and the line that is wrong."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{path}: cannot be read as text ({os_reason(error)})",
+            "check the path, and that it is plain text in UTF-8",
+        ) from error
+    poses = []
+    for number, line in enumerate(text.splitlines(), 1):
+        content = line.split("#")[0]
+        if content.strip():
+            poses.append(parse(content, f"{path}, line {number}"))
+    if not poses:
+        raise InputError(f"{path}: no pose in it", "write one a line, for instance: x y z roll pitch yaw")
+    return poses
+
+
+def parse(text: str, what: str, counts: tuple[int, ...] = tuple(FORMS)) -> Pose:
+    """Return the pose that ``text`` writes in as many numbers as ``counts`` allows."""
+    words = text.replace(",", " ").split()
+    if len(words) not in counts:
+        allowed = ", ".join(f"{count} ({FORMS[count]})" for count in counts)
+        raise InputError(f"{what}: {len(words)} numbers are not a pose", f"give {allowed}")
+    if len(words) in (3, 6):
+        position = numbers(" ".join(words[:3]), what)
+        fixed = {name: word for name, word in zip(WHOLE, words[3:], strict=False) if word != FREE}
+        angles = dict(zip(fixed, numbers(" ".join(fixed.values()), what), strict=True))
+        return Pose.of_angles(position, angles, what)
+    found = numbers(text, what)
+    if len(words) == 7:
+        return Pose.of_matrix(from_quaternion(found[:3], found[3:], what))
+    return Pose.of_matrix(checked(np.reshape(found, (-1, 4)), what))
+
+
+def numbers(text: str, what: str) -> list[float]:
+    """Return the numbers of ``text``, separated by blanks or commas; InputError for anything else."""
+    found = []
+    for word in text.replace(",", " ").split():
+        try:
+            found.append(float(word))
+        except ValueError:
+            raise InputError(f"{what}: {word!r} is not a number", "write it like 12.5 or 1e-3") from None
+        if not abs(found[-1]) <= LARGEST:
+            raise InputError(
+                f"{what}: {word!r} is not a finite number of at most {LARGEST:g}",
+                "correct it; units are mm and degrees",
+            )
+    return found

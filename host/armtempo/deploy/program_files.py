@@ -9,7 +9,7 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -19,7 +19,7 @@ from armtempo_shared import table
 
 from armtempo.basics import installation
 from armtempo.basics.errors import InputError, LinkError, MissingPackageError
-from armtempo.deploy import frames, sectors
+from armtempo.deploy import sectors
 from armtempo.deploy.constants import fold, is_empty
 from armtempo.link.program_version import IN_LIBRARY, PACKAGES, own_crc, package_folder
 
@@ -178,7 +178,7 @@ def _short_table(text: str) -> str:
 def in_full(traceback: str) -> str:
     """A traceback from the board by the sources' files and functions, whichever way the program got there."""
     texts = {name: path.read_text(encoding="utf-8") for name, path in modules().items()}
-    return frames.in_full(traceback, texts)
+    return _by_sources(traceback, texts)
 
 
 def _compiler(mpy: int) -> tuple[str, str]:
@@ -248,3 +248,44 @@ def _run(*command: str) -> None:
             f"mpy-cross failed: {done.stderr.strip() or done.stdout.strip()}",
             _REPORT,
         )
+
+
+# tracebacks
+_FRAME = re.compile(r'File "(?:[^"]*/)?(armtempo_[^"]+\.py|\w+)", line (\d+), in (\w+)')
+"""From the chip's last two sectors a module's name is all that is known of its file."""
+
+
+def _by_sources(traceback: str, sources: Mapping[str, str]) -> str:
+    """The traceback with paths from the packages on, and the class before the name of a method.
+
+    ``sources``: text by the path from the packages on.
+    """
+
+    paths = {Path(path).stem: path for path in sources}
+
+    def place(frame: re.Match[str]) -> str:
+        path, line, name = paths.get(frame[1], frame[1]), int(frame[2]), frame[3]
+        if path not in sources:
+            return frame[0]
+        around = _around(sources[path], line, name)
+        return f'File "{path}", line {line}, in {around}{name}'
+
+    return _FRAME.sub(place, traceback)
+
+
+def _around(text: str, line: int, name: str) -> str:
+    """The class around the function of that name at a line, with a dot; "" if there is none."""
+    places = [
+        around
+        for node, around in _functions(ast.parse(text))
+        if node.name == name and node.lineno <= line <= (node.end_lineno or line)
+    ]
+    return places[0] if places else ""
+
+
+def _functions(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef, str]]:
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef):
+            yield node, ""
+        elif isinstance(node, ast.ClassDef):
+            yield from ((each, f"{node.name}.") for each in node.body if isinstance(each, ast.FunctionDef))

@@ -61,7 +61,7 @@ def _postures(arm: Arm) -> list[Finding]:
 
 def _touching(arm: Arm) -> list[Finding]:
     """Findings about touching parts in the home posture, the named postures, and on the ways to the switches."""
-    from armtempo.planning import homing_check, via_points, workspace_check  # here, as above
+    from armtempo.planning import via_points, workspace_check  # here, as above
 
     found = []
     for posture in (arm.posture(HOME), *arm.postures):
@@ -85,7 +85,7 @@ def _touching(arm: Arm) -> list[Finding]:
                 "home other joints first ('homing' in the arm file), or put the switch at the other end; nothing "
                 "checks the ways of homing while it moves",
             )
-            for problem in homing_check.touching(arm)
+            for problem in workspace_check.touching(arm)
         ]
     return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from armtempo.diagnosis.finding import Finding, error, note, warning
-from armtempo.model import channels, home_switches
+from armtempo.model import home_switches, pin_use
 from armtempo.model.arm import Arm
 from armtempo.model.parts import DrivenJoint, Joint
 from armtempo.model.pin_use import problems as pin_problems
@@ -35,7 +35,7 @@ def findings(arm: Arm) -> list[Finding]:
 def _channels(arm: Arm) -> list[Finding]:
     return [
         error(" and ".join(joints), f"share {key}.channel = {channel}", "give each its own channel")
-        for key, channel, joints in channels.shared(arm.joints)
+        for key, channel, joints in pin_use.shared(arm.joints)
     ]
 
 

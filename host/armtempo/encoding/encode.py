@@ -1,4 +1,4 @@
-"""From degrees and seconds to the board's steps, counts and ticks: arm record and motion record."""
+"""From degrees and seconds to the board's steps, counts and ticks: arm record and motion record; and back."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from armtempo_shared import armrecord, limits, motion
 from armtempo_shared import way_back as motion_way_back
+from armtempo_shared.motion import Motion, MotionError
 from armtempo_shared.wire import record_crc
 from numpy.typing import NDArray
 
+from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
 from armtempo.model import pin_use
 from armtempo.model.arm import Arm
@@ -23,9 +25,10 @@ from armtempo.model.joint_unit import REVOLUTE
 from armtempo.model.outputs import SERVO, Output
 from armtempo.model.parts import PROGRAM, DrivenJoint
 from armtempo.model.pin_use import Period
+from armtempo.model.transmission import Transmission
 from armtempo.planning import board_limits
 from armtempo.planning.brake_time import BrakeTimes
-from armtempo.splines.trajectory import Trajectory
+from armtempo.splines.trajectory import JointSpline, Trajectory
 
 _NOT_IDENTITY = ("name", "range_deg", "home_deg", "limits", "model", "radius_mm")
 """Fields of a joint that do not affect its position in steps."""
@@ -272,3 +275,47 @@ def _output(output: Output, place: TimerOutput | None) -> dict[str, Any]:
         "low": low,
         "high": high,
     }
+
+
+# and back
+def decoded(data: bytes, gears: Transmission, name: str, arm: str = "the arm") -> Trajectory:
+    """The motion in a record, to the rounding of its integers; ``gears``: of the arm that it was made for.
+
+    ``name`` and ``arm`` are used in messages. Raises InputError if the record is damaged or has another number of
+    joints.
+    """
+    try:
+        motion = Motion(data)
+    except MotionError as error:
+        raise InputError(f"motion {name!r}: not a motion record ({error})", "upload it again") from error
+    joints = len(gears.steps_per_deg)
+    if motion.joints != joints:
+        raise InputError(
+            f"motion {name!r} has {motion.joints} joints, {arm} drives {joints}",
+            "connect the board that it was made for, or upload it again",
+        )
+    if gears.coupling and not motion.shared:
+        raise InputError(
+            f"motion {name!r}: its joints have a time axis each, but {arm} has coupled joints",
+            "upload it again",
+        )
+    steps = [
+        _points(data, motion.angle_offset(index), motion.segments + motion.degree) for index in range(joints)
+    ]
+    angles = gears.angles_of_steps(np.stack(steps, axis=-1) / 2.0**limits.STEP_FRACTION_BITS)
+    splines = []
+    for index in range(joints):
+        times = _points(data, motion.time_offset(index), motion.segments * motion.refine + motion.degree)
+        splines.append(
+            JointSpline(
+                motion.degree,
+                motion.refine,
+                angles[:, index].copy(),
+                times / 2.0**limits.TICK_FRACTION_BITS / limits.TICK_HZ,
+            )
+        )
+    return Trajectory(name, tuple(splines), motion.shared)
+
+
+def _points(data: bytes, offset: int, count: int) -> Array:
+    return np.frombuffer(data, "<i8", count, offset).astype(float)

@@ -14,7 +14,7 @@ from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import InputError
-from armtempo.encoding import decode, encode, made_with
+from armtempo.encoding import encode, made_with
 from armtempo.model.arm import Arm
 from armtempo.model.leg import SequenceRow, only_row
 from armtempo.model.plan import Plan
@@ -151,7 +151,7 @@ def _of_sequence(plan: Plan) -> Encoded:
 
 def of_record(name: str, data: bytes, arm: Arm) -> Encoded:
     """The motion of a record from the board; raises InputError if it is damaged or does not fit the arm."""
-    trajectory = decode.trajectory(data, arm.transmission, name, f"arm {arm.name!r}")
+    trajectory = encode.decoded(data, arm.transmission, name, f"arm {arm.name!r}")
     return Encoded.of_motion(name, arm, trajectory, data)
 
 

@@ -12,11 +12,11 @@ from armtempo_shared.wire import record_crc
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import ArmtempoError, InputError, PlanError
-from armtempo.encoding import encode, encoded_plan, planned_for
+from armtempo.encoding import encode, encoded_plan, made_with
 from armtempo.encoding.encoded_plan import Encoded, MotionKey
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import home_switches
+from armtempo.model import home_switches, program_calls
 from armtempo.model.arm import Arm
 from armtempo.model.home_switches import HomeSwitch
 from armtempo.model.outputs import SWITCH, Output
@@ -25,7 +25,7 @@ from armtempo.model.parts import DrivenJoint
 from armtempo.model.plan import Plan
 from armtempo.model.posture import HOME
 from armtempo.model.user_program import UserProgram
-from armtempo.planning import homing_check, pallet_places, point_to_point, via_points, workspace_check
+from armtempo.planning import point_to_point, via_points, workspace_check
 
 Places = dict[str, dict[str, list[tuple[Array, Array]]]]
 """By pallet and tool: the driven joints' angles above each place and at it, degrees, (J,) each."""
@@ -65,7 +65,7 @@ def motions_beside(found: UserProgram, arm: Arm) -> tuple[Encoded, ...]:
     files = {name: found.motion_file(name) for name in found.motions}
     plans = {name: Plan.load_motion(file) for name, file in files.items() if file.is_file()}
     for name, plan in plans.items():
-        planned_for.check(files[name], plan, arm)
+        made_with.check_plan(files[name], plan, arm)
     return tuple(encoded_plan.of_plan(plan, name) for name, plan in plans.items())
 
 
@@ -117,6 +117,7 @@ def table(arm: Arm, found: UserProgram, places: Places) -> dict[str, Any]:
         "pallets": _shapes(arm, places),
         "tools": {tool: _others(bare, _postures(arm.with_tool(tool))) for tool in found.tools},
         "homing": _homing(arm) if found.homes else {},
+        **({"taken": program_calls.taken(arm)} if found.takes else {}),
     }
 
 
@@ -193,7 +194,7 @@ def _shapes(arm: Arm, places: Places) -> dict[str, list[Any]]:
 def _places(arm: Arm, pallet: ArmPallet) -> list[tuple[Array, Array]]:
     """The joints' angles above each place and at it, the solution nearest to those above: degrees, (J,) each."""
     found = []
-    for place in pallet_places.resolve(arm, pallet):
+    for place in via_points.places(arm, pallet):
         try:
             at = via_points.nearest(arm, place.pose, place.above_deg)
         except ArmtempoError as error:
@@ -224,7 +225,7 @@ def moves_that_touch(found: EncodedProgram) -> list[str]:
     tool that it names, and without; and with the ways to the switches, if it homes the arm. The board knows nothing of
     the workspace; which of these moves the program makes is not known either.
     """
-    problems = homing_check.touching(found.arm) if found.program.homes else []
+    problems = workspace_check.touching(found.arm) if found.program.homes else []
     for tool in ("", *found.program.tools):
         arm = found.arm.with_tool(tool)
         if workspace_check.can_touch(arm):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import struct
 from binascii import crc32
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from armtempo_shared.sequence import KIND_BYTES, MAGIC, SequenceData
 
 from armtempo.basics import json_codec
 from armtempo.basics.errors import InputError
+from armtempo.encoding.encode import arm_record
 from armtempo.model import frame
 from armtempo.model.arm import Arm
 from armtempo.model.parts import NOTHING, Joint
@@ -128,3 +130,23 @@ def check_stored(name: str, data: bytes, arm: Arm) -> None:
     """Raise InputError if what the board has as ``name`` was made with something that has changed since."""
     if change := changed(of_record(data), arm):
         raise InputError(f"{name!r} on the board is old: {change}", "plan it again, and upload it")
+
+
+# of a plan
+def check_plan(what: Path | str, plan: Plan, arm: Arm) -> None:
+    """Raise InputError if a plan, named ``what``, is for another arm, or old as in ``check_surroundings``."""
+    if arm_record(plan.arm) != arm_record(arm):
+        raise InputError(
+            f"{what} was planned for a different arm than {_named(arm)}", "plan it again with this arm"
+        )
+    check_surroundings(what, plan, arm)
+
+
+def check_surroundings(what: Path | str, plan: Plan, arm: Arm) -> None:
+    """Raise InputError if something that a plan was made with has changed since."""
+    if change := changed(of_plan(plan), arm, plan.arm):
+        raise InputError(f"{what} is old: {change}, in {_named(arm)}", "plan it again with this arm")
+
+
+def _named(arm: Arm) -> str:
+    return f"arm {arm.name!r}" + (f" ({arm.source})" if arm.source else "")

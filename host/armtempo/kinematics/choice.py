@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armtempo.basics.arrays import Array
+from armtempo.kinematics.closed_form import Regions, classify
 from armtempo.kinematics.formulas import wrist_centre
 from armtempo.kinematics.geometry import Geometry
 from armtempo.kinematics.inverse import folded, inverse_of_pose, spread
 from armtempo.kinematics.ranges import Ranges
-from armtempo.kinematics.regions import Regions, classify
 from armtempo.kinematics.rejection import Rejection, WristCentre, reasons
 from armtempo.kinematics.shape import Shape
 from armtempo.kinematics.solutions import BRANCHES, OK, OUT_OF_REACH, Branch, PoseSolutions

@@ -16,14 +16,12 @@ from armtempo.basics.text import did_you_mean
 from armtempo.basics.toml_table import Table
 from armtempo.model import (
     boards,
-    channels,
-    coupled,
     drive_limits,
     home_switches,
     outputs_file,
     parts_file,
     pin_use,
-    posture_file,
+    posture,
     shipped,
     transmission,
     workspace,
@@ -121,7 +119,7 @@ class Arm:
         """Raise InputError for a coupling that is none, or for what the board cannot do with coupled joints."""
         joints = self.table_joints
         names = [joint.name for joint in joints]
-        problem = transmission.coupling_problem(self.coupling, names) or coupled.board_problem(
+        problem = transmission.coupling_problem(self.coupling, names) or transmission.board_problem(
             joints, self.homing, Transmission((1.0,) * len(joints), (), self.coupling)
         )
         if problem:
@@ -248,7 +246,7 @@ class Arm:
     @cached_property
     def motors(self) -> tuple[DrivenJoint, ...]:
         """The driven joints; those that are coupled have range and limits of their motors behind the gears."""
-        return coupled.motors(self.driven, self.transmission)
+        return transmission.motors(self.driven, self.transmission)
 
     @cached_property
     def crossings(self) -> tuple[drive_limits.Crossing | None, ...]:
@@ -361,7 +359,7 @@ class Arm:
 
     def read_posture(self, tables: Table, name: str) -> ArmPosture:
         """The posture ``name`` of a file's table [posture]; raises InputError if the arm cannot take it."""
-        found = posture_file.read(tables, name, self.texts, self.frames, self.all_home_deg)
+        found = posture.read(tables, name, self.texts, self.frames, self.all_home_deg)
         if problem := self.posture_problem(found):
             raise InputError(
                 f"{tables.file}: posture.{name}: {problem}", "give a posture that the arm can take"
@@ -439,7 +437,7 @@ def _driven(joint: Joint, limits: Limits) -> DrivenJoint:
 def _check_channels(arm: Arm, path: Path | str) -> None:
     if not arm.driven:
         raise InputError(f"{path}: no joint has a motor", "add at least one [joint.motor]")
-    for key, channel, joints in channels.shared(arm.joints):
+    for key, channel, joints in pin_use.shared(arm.joints):
         raise InputError(
             f"{path}: {key}.channel = {channel} is used by {' and '.join(joints)}", "give each joint its own"
         )

@@ -13,8 +13,9 @@ from armtempo.basics import json_codec, toml_table
 from armtempo.basics.arguments import checked, checked_fields
 from armtempo.basics.errors import InputError
 from armtempo.basics.toml_table import Table
-from armtempo.model import frame, posture_file, shipped, tool_segment, via_table
+from armtempo.model import frame, shipped, tool_segment, via_table
 from armtempo.model.arm import Arm
+from armtempo.model.posture import given_key
 from armtempo.model.tool_pose import BASE, TOLERANCE_DEG, TOLERANCE_MM, Pose, from_table
 from armtempo.model.tool_segment import POINTS, ToolSegment
 from armtempo.optimise import ALGORITHMS
@@ -291,7 +292,7 @@ def _vias(
     Poses and points of arcs are turned into the base.
     """
     default = frame.named(top, arm.frames)
-    listed = posture_file.given_key(top, arm.texts, "via_deg")
+    listed = given_key(top, arm.texts, "via_deg")
     if top.has(listed) == top.has("via"):
         if top.has("via"):
             raise top.misplaced(
@@ -342,7 +343,7 @@ def _stop(table: Table, via: int, count: int) -> Stop:
 def _via(table: Table, name: str, arm: Arm, segment: ToolSegment | None) -> tuple[float, ...] | Pose:
     """A via point; of a pose in the frame ``name``, in the base."""
     where = f"{table.file}: {table.place.removesuffix('.')}"
-    listed = posture_file.given_key(table, arm.texts, "angles_deg")
+    listed = given_key(table, arm.texts, "angles_deg")
     forms = [key for key in (listed, "matrix", "position_mm", "posture") if table.has(key)]
     if len(forms) != 1:
         raise InputError(
@@ -360,7 +361,7 @@ def _via(table: Table, name: str, arm: Arm, segment: ToolSegment | None) -> tupl
         found = read_angles(table, listed, arm)
         _done(table, segment)
         return found
-    near = posture_file.given_key(table, arm.texts, "posture_deg")
+    near = given_key(table, arm.texts, "posture_deg")
     posture = table.numbers(near, len(arm.joints)) if table.has(near) else None
     pose = frame.pose_in_base(from_table(table, where), arm.frames, name, where)
     table.done()

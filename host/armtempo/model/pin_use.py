@@ -1,14 +1,17 @@
-"""The pin and timer of each output, input and home switch of an arm, and conflicts between them."""
+"""The pin and timer of each output, input and home switch of an arm, and conflicts between them and of channels."""
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from armtempo.model import engine_pins
 from armtempo.model.boards import BOARDS, DEFAULT, TIMER_OUTPUTS, BoardPins, TimerOutput
 from armtempo.model.engine_pins import ChannelUser
 from armtempo.model.outputs import SWITCH, Input, Output
+from armtempo.model.parts import Joint
 
 _MORE = "'armtempo help hardware' lists what is free"
 _MOST_COUNTS = 65_535
@@ -143,3 +146,22 @@ def _place(
         else:
             return place, ""
     return None, why[-1]
+
+
+class SharedChannel(NamedTuple):
+    """A channel of the board used by more than one joint."""
+
+    key: str
+    """``"motor"`` or ``"encoder"``."""
+    channel: int
+    joints: tuple[str, ...]
+
+
+def shared(joints: Iterable[Joint]) -> list[SharedChannel]:
+    """Channels used by more than one joint; empty for those of a valid arm."""
+    users: dict[tuple[str, int], list[str]] = defaultdict(list)
+    for joint in joints:
+        for key, part in (("motor", joint.motor), ("encoder", joint.encoder)):
+            if part is not None:
+                users[key, part.channel].append(joint.name)
+    return [SharedChannel(*place, tuple(names)) for place, names in users.items() if len(names) > 1]

@@ -4,25 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import InputError, MissingPackageError
-from armtempo.new_arm import (
-    urdf_bodies,
-    urdf_limits,
-    urdf_numbers,
-    urdf_refusals,
-    urdf_tip,
-    urdf_transmissions,
-)
+from armtempo.basics.text import is_number
+from armtempo.new_arm import urdf_bodies, urdf_refusals, urdf_tip, urdf_transmissions
 from armtempo.new_arm.urdf_chain import MM, Chain, ChainJoint, transform
 from armtempo.new_arm.urdf_refusals import SLIDING
 
@@ -67,7 +61,7 @@ def read(path: Path, base: str | None = None, tip: str | None = None) -> Chain:
     couplings, unclear = urdf_transmissions.of_file(path, names)
     zero = transform(model, last, first)
     doubtful = _doubtful_origins(root, {joint.name for joint in joints})
-    unread = [text for text in map(urdf_limits.unread, moving) if text]
+    unread = [text for text in map(unread_numbers, moving) if text]
     unclear = (*unclear, *doubtful, *unread)
     return Chain(model.robot.name, first, last, found, zero, model, couplings, unclear)
 
@@ -118,7 +112,7 @@ def _checked(path: Path) -> ElementTree.Element:
             f"{path}: is a xacro file{left}",
             f"make a URDF of it first: xacro {path} > robot.urdf (xacro is a part of ROS)",
         )
-    urdf_numbers.check(path, root)
+    check(path, root)
     return root
 
 
@@ -171,11 +165,11 @@ def _joint(model: Any, base: str, joint: Any, after: Any) -> ChainJoint:
     low_high, narrowed_by = CONTINUOUS_DEG, ""
     if joint.mimic is not None:
         low_high = (0.0, 0.0)
-    elif (ends := urdf_limits.ends(joint)) is not None:
+    elif (ends := range_ends(joint)) is not None:
         low_high = (
             (MM * ends.low, MM * ends.high) if slides else (math.degrees(ends.low), math.degrees(ends.high))
         )
-        narrowed_by = urdf_limits.SOFT if ends.are_soft else ""
+        narrowed_by = SOFT if ends.are_soft else ""
         continuous = False
     speed = None
     if limit is not None and limit.velocity:
@@ -192,7 +186,7 @@ def _narrowed(path: Path, moving: Sequence[Any], found: Iterable[ChainJoint]) ->
     """The joints, those that turn others by a linkage within the limits of these too."""
     joints = list(found)
     for number, joint in enumerate(moving):
-        ends = urdf_limits.ends(joint) if joint.mimic is not None else None
+        ends = range_ends(joint) if joint.mimic is not None else None
         if ends is None:
             continue
         offset, before = joint.mimic.offset or 0.0, joints[number - 1]
@@ -207,3 +201,99 @@ def _narrowed(path: Path, moving: Sequence[Any], found: Iterable[ChainJoint]) ->
             by = f"the limits of {joint.name!r}, which its linkage turns"
             joints[number - 1] = replace(before, range_deg=kept, continuous=False, narrowed_by=by)
     return tuple(joints)
+
+
+# ends of the range
+SOFT = "the soft limits of its safety_controller"
+
+
+class Ends(NamedTuple):
+    """In the URDF's unit, rad or m."""
+
+    low: float
+    high: float
+    are_soft: bool
+    """Whether one of them is a soft limit."""
+
+
+def range_ends(joint: Any) -> Ends | None:
+    """The ends of a joint's range; None without limits, as of a continuous joint."""
+    hard, soft = joint.limit, _soft(joint)
+    known = joint.type != "continuous" and hard is not None and None not in (hard.lower, hard.upper)
+    if soft is None or not soft[0] < soft[1]:
+        return Ends(hard.lower, hard.upper, False) if known else None
+    if not known:
+        return Ends(*soft, True)
+    low, high = max(hard.lower, soft[0]), min(hard.upper, soft[1])
+    if not low < high:
+        return Ends(hard.lower, hard.upper, False)
+    return Ends(low, high, (low, high) != (hard.lower, hard.upper))
+
+
+def unread_numbers(joint: Any) -> str:
+    """What is said of soft limits that leave no range; "" if there is nothing."""
+    soft, found = _soft(joint), range_ends(joint)
+    if soft is None or joint.mimic is not None:
+        return ""
+    if soft[0] < soft[1] and (found is None or max(found.low, soft[0]) < min(found.high, soft[1])):
+        return ""
+    return (
+        f"joint {joint.name!r}: the soft limits of its safety_controller, {soft[0]:g} to {soft[1]:g}, leave it no "
+        "range and are not used; correct them"
+    )
+
+
+def _soft(joint: Any) -> tuple[float, float] | None:
+    """The soft limits; None if they are not given, 0 being what is left out."""
+    controller = joint.safety_controller
+    low, high = (getattr(controller, key, None) or 0.0 for key in ("soft_lower_limit", "soft_upper_limit"))
+    return (low, high) if low or high else None
+
+
+# numbers, looked at before
+_OF_JOINTS = {
+    "origin": {"xyz": 3, "rpy": 3},
+    "axis": {"xyz": 3},
+    "limit": {"lower": 1, "upper": 1, "velocity": 1, "effort": 1},
+    "mimic": {"multiplier": 1, "offset": 1},
+    "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1},
+}
+"""How many numbers are in the attributes of a joint's elements."""
+_OF_LINKS = {
+    "inertial/origin": {"xyz": 3, "rpy": 3},
+    "inertial/mass": {"value": 1},
+    "inertial/inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+}
+_MAY_BE_ENDLESS = ("velocity", "effort", "lower", "upper")
+"""Infinite limits are no range, which is said later, or no limit."""
+
+
+def check(path: Path, root: ElementTree.Element) -> None:
+    """Raise InputError, naming the first, for attributes that are not the numbers which a URDF has there."""
+    for kind, elements in (("joint", _OF_JOINTS), ("link", _OF_LINKS)):
+        for part in root.findall(kind):
+            for place, attributes in elements.items():
+                for element in part.findall(place):
+                    for key, count, value in _given(element, attributes):
+                        if problem := _problem(key, count, value):
+                            where = f"{path}: {kind} {part.get('name')!r}: <{element.tag}> {key}={value!r}"
+                            raise InputError(f"{where} {problem}", "correct it there")
+
+
+def _given(element: ElementTree.Element, attributes: dict[str, int]) -> Iterator[tuple[str, int, str]]:
+    for key, count in attributes.items():
+        if (value := element.get(key)) is not None:
+            yield key, count, value
+
+
+def _problem(key: str, count: int, value: str) -> str:
+    """Why a value is not what it should be; empty if it is."""
+    words = value.split()
+    if len(words) != count or not all(map(is_number, words)):
+        return "is not a number" if count == 1 else f"is not {count} numbers, with blanks between them"
+    numbers = [float(word) for word in words]
+    if not all(
+        math.isfinite(number) or (key in _MAY_BE_ENDLESS and math.isinf(number)) for number in numbers
+    ):
+        return "is not finite"
+    return "is below 0" if key == "velocity" and numbers[0] < 0.0 else ""

@@ -13,7 +13,7 @@ from tomlkit.items import Array
 
 from armtempo.basics import toml_table
 from armtempo.basics.errors import ArmtempoError, InputError
-from armtempo.encoding import planned_for
+from armtempo.encoding import made_with
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.model.joint_unit import NEUTRAL
@@ -168,7 +168,7 @@ class JobEditor(FileEditor):
         """Whether a frame or the tool of the plan has changed."""
         try:
             if self.plan is not None:
-                planned_for.check_surroundings(self.plan.name, self.plan, arm)
+                made_with.check_surroundings(self.plan.name, self.plan, arm)
         except InputError:
             return True
         return False

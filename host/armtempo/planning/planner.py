@@ -5,22 +5,24 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from typing import NamedTuple
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
+from armtempo.basics.errors import InputError
 from armtempo.basics.installation import installed_version
 from armtempo.basics.progress import Progress, watched
+from armtempo.model import point_groups, tool_segment
 from armtempo.model.arm import Arm
-from armtempo.model.job import Job
+from armtempo.model.job import Job, Stop
 from armtempo.model.leg import JobSolution
 from armtempo.model.plan import Plan
 from armtempo.model.tool_pose import Pose
 from armtempo.model.tool_segment import ToolSegment
-from armtempo.planning import checks, near_points, path_deviation, through_plan, workspace_check
+from armtempo.planning import checks, path_deviation, through_plan, workspace_check
 from armtempo.planning.free import around
 from armtempo.planning.through_plan import Planned
 from armtempo.splines import extremes
@@ -104,9 +106,9 @@ class PlannedPoints(NamedTuple):
 
 
 def points_of(arm: Arm, job: Job) -> PlannedPoints:
-    """The job and the angles that are planned; errors as in ``near_points.merged`` and ``via_angles``."""
+    """The job and the angles that are planned; errors as in ``merged`` and ``via_angles``."""
     via, notes = via_angles(arm, job)
-    job, kept, told = near_points.merged(arm, job, via)
+    job, kept, told = merged(arm, job, via)
     if told:
         via = via[kept]  # as a pose is solved from the point before, which may be gone from the job
         notes = via_angles(arm, job)[1]
@@ -157,3 +159,91 @@ def slower(trajectory: Trajectory, speed: float) -> Trajectory:
         replace(joint, time_points_s=np.asarray(joint.time_points_s / speed)) for joint in trajectory.joints
     )
     return replace(trajectory, joints=joints)
+
+
+# via points less than a step apart
+_KEYS = ("blend_mm", "speed_mm_s", "acceleration_mm_s2")
+
+
+class Merged(NamedTuple):
+    """A job without via points less than a step apart."""
+
+    job: Job
+    kept: list[int]
+    """Of its via points, their numbers in the other job."""
+    notes: tuple[str, ...]
+    """One for each point that was several."""
+
+
+def merged(arm: Arm, job: Job, via_deg: Array) -> Merged:
+    """The job with via points as one that are less than a step of each motor apart.
+
+    ``via_deg``: (n + 1, J), the angles at the via points. The first point of a group stays, or the motion's last; the
+    two ends are never one. Stops stay, and their dwells add up; what is asked of the tool between points that become
+    one counts for the way to them. Raises InputError if that is not the same, or a dwell would be at an end.
+    """
+    groups = point_groups.groups(arm.transmission.steps(via_deg), partial(_may_join, job))
+    if len(groups) == len(job.via):
+        return Merged(job, list(range(len(job.via))), ())
+    last = len(job.via) - 1
+    kept = [point_groups.kept(group, last) for group in groups]
+    segments = []
+    stops = []
+    notes = []
+    for number, group in enumerate(groups):
+        if (segment := _segment(job, group)) is not None:
+            segments.append(replace(segment, via=number))
+        inside = [stop for stop in job.stops if stop.via in group]
+        rest_s = sum(stop.dwell_s for stop in inside)
+        if group[0] == 0 or group[-1] == last:
+            if rest_s:
+                raise _conflict(
+                    job, group, f"the dwell_s of P{inside[0].via}", "is not at an end of the motion"
+                )
+        elif inside:
+            stops.append(Stop(number, rest_s))
+        if len(group) > 1:
+            rests = f", with {rest_s:g} s of rest" if rest_s else ""
+            place = via_deg[kept[number]].tolist()
+            where = arm.texts.listed(f"{round(angle, 4) + 0.0:g}" for angle in place)
+            notes.append(
+                f"{_named(group)} are less than a step apart, and planned as one point, P{number} at {where}{rests}; "
+                "later via points count from it"
+            )
+    via = tuple(job.via[number] for number in kept)
+    found = replace(job, via=via, stops=tuple(stops), tool_segments=tuple(segments))
+    return Merged(found, kept, tuple(notes))
+
+
+def _may_join(job: Job, before: int, number: int) -> bool:
+    """Whether nothing leads away and back between two via points, and a free path need not find its own places."""
+    segment = tool_segment.at(job.tool_segments, number)
+    if segment is not None and (segment.arc_through_mm or segment.circle_through_mm):
+        return False
+    return not (checks.is_free(job) and any(checks.is_wide(job.via[each]) for each in (before, number)))
+
+
+def _segment(job: Job, group: Sequence[int]) -> ToolSegment | None:
+    """What is asked of the tool on the way to a group of via points."""
+    way = tool_segment.at(job.tool_segments, group[0])
+    for number in group[1:]:
+        inside = tool_segment.at(job.tool_segments, number)
+        for key in _KEYS if inside is not None else ():
+            value = getattr(inside, key)
+            if value != getattr(way, key, None) and (
+                value or (key == "blend_mm" and getattr(way, key, None))
+            ):
+                raise _conflict(job, group, f"{key} of P{number}", f"is not that of the way to P{group[0]}")
+    return way
+
+
+def _conflict(job: Job, group: Sequence[int], what: str, why: str) -> InputError:
+    return InputError(
+        f"job {job.name!r}: {_named(group)} are less than a step apart, so they are one point, but {what} {why}",
+        "leave that out, or all but one of these via points",
+    )
+
+
+def _named(group: Sequence[int]) -> str:
+    names = [f"P{number}" for number in group]
+    return f"{', '.join(names[:-1])} and {names[-1]}"

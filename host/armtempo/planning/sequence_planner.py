@@ -16,9 +16,9 @@ from armtempo.model.posture import ArmPosture
 from armtempo.model.sequence import Sequence
 from armtempo.model.steps import Step
 from armtempo.model.tool_pose import BASE, Pose
-from armtempo.planning import pallet_places, planner
-from armtempo.planning.pallet_places import Place
+from armtempo.planning import planner, via_points
 from armtempo.planning.sequence_motions import Angles, NamedAngles, SequenceMotions, to_angles
+from armtempo.planning.via_points import Place
 
 _THEN = {kinds.NEXT: record.NEXT_THEN, kinds.FAULT: record.FAULT_THEN}
 
@@ -179,7 +179,7 @@ class _Compiler:
                 self.motions.frames.append(pallet.frame)
             key = step.pallet, self.motions.tool
             if key not in self.places:
-                self.places[key] = pallet_places.resolve(self.motions.arm, pallet)
+                self.places[key] = via_points.places(self.motions.arm, pallet)
         except ArmtempoError as error:
             raise type(error)(f"{step.where}repeat: {error.problem}", error.hint) from error
         return self.places[key]

@@ -15,13 +15,13 @@ A pose that asks for less than the whole orientation is solved for the driven jo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armtempo.basics.arrays import Array
-from armtempo.basics.errors import InputError, PlanError
+from armtempo.basics.errors import ArmtempoError, InputError, PlanError
 from armtempo.kinematics.choice import Choice, choose
 from armtempo.kinematics.constraint import Constraint, Miss
 from armtempo.kinematics.forward import frames
@@ -31,6 +31,7 @@ from armtempo.kinematics.solutions import Branch, branch_of
 from armtempo.kinematics.solver import PoseSolver
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.model.pallet import ArmPallet
 from armtempo.model.posture import ArmPosture
 from armtempo.model.tool_pose import WHOLE, Pose
 
@@ -293,3 +294,39 @@ def _branch_note(old: Branch, new: Branch, choice: Choice | None, number: int) -
             text += f". Staying in {candidate.branch} is not possible: {candidate.rejections[0].text}"
             break
     return [Note("branch", number, text)]
+
+
+# places of pallets
+@dataclass(frozen=True)
+class Place:
+    """A place of a pallet."""
+
+    name: str
+    """Its row, column, layer and pallet."""
+    pose: Pose
+    """Of the tool there, in the base."""
+    above_deg: tuple[float, ...]
+    """The driven joints' angles with the tool above it, degrees (J,)."""
+
+
+def places(arm: Arm, pallet: ArmPallet) -> list[Place]:
+    """All places, in order; the angles above each are the solution nearest to the place before, at first to home.
+
+    Raises PlanError, with row, column and layer, for a place above which the tool cannot be; InputError as
+    ``ArmPallet.pose``.
+    """
+    found: list[Place] = []
+    for number in range(1, pallet.places + 1):
+        name = pallet.describe(number)
+        above = pallet.pose(number, arm.frames, above=True)
+        try:
+            if found:
+                angles = nearest(arm, above, found[-1].above_deg)
+            else:
+                home = replace(above, posture_deg=arm.all_home_deg)
+                angles = posture_deg(arm, ArmPosture(name, home))
+        except ArmtempoError as error:
+            problem = error.problem.split(": ", 1)[-1]
+            raise type(error)(f"{pallet.above_mm:g} mm above {name}: {problem}", error.hint) from error
+        found.append(Place(name, pallet.pose(number, arm.frames), tuple(map(float, angles))))
+    return found

@@ -21,9 +21,11 @@ from armtempo.basics.progress import alive
 from armtempo.kinematics.chain import all_angles_deg, outline_mm
 from armtempo.kinematics.forward import forward
 from armtempo.kinematics.geometry import Geometry
+from armtempo.model import home_switches
 from armtempo.model.arm import Arm
 from armtempo.model.joint_unit import SLIDE_MM
 from armtempo.model.workspace import KeepOut, Workspace
+from armtempo.planning import point_to_point
 from armtempo.planning.capsules import box_distance, segment_distance
 from armtempo.splines import extremes
 from armtempo.splines.trajectory import Trajectory
@@ -327,3 +329,21 @@ def _refused(arm: Arm, trajectory: Trajectory, touch: Touch, place: str) -> Plan
         f"add or move a via point, take another branch with {arm.texts.list_key('posture_deg')}, or correct "
         "[workspace] in the arm file",
     )
+
+
+def touching(arm: Arm) -> list[str]:
+    """The moves that would leave the workspace, one group of joints after the other, while the others are at home."""
+    if not can_touch(arm):
+        return []
+    problems = []
+    home_deg = np.array(arm.home_deg)
+    for group in home_switches.groups(arm):
+        end_deg = home_deg.copy()
+        for index, switch in group.items():
+            end_deg[index] = switch.edge_deg
+        names = ", ".join(arm.driven[index].name for index in group)
+        try:
+            check(arm, point_to_point.straight("home", home_deg, end_deg, arm))
+        except PlanError as error:
+            problems.append(f"between home and the switch of {names}: {error.problem}")
+    return problems

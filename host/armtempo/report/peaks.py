@@ -10,8 +10,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.model.parts import Limits
 from armtempo.report import replayed
-from armtempo.report.analysis import SAMPLE_S, Curves
-from armtempo.report.differentiation import noise, of_curves, quantisation_sigma, weights
+from armtempo.report.analysis import SAMPLE_S, Curves, noise, of_curves, quantisation_sigma, weights
 from armtempo.splines.trajectory import Trajectory
 
 PEAK_WINDOW = 11

@@ -10,7 +10,7 @@ import numpy as np
 from armtempo.basics.arrays import Array
 from armtempo.basics.atomic_file import os_reason
 from armtempo.basics.errors import ArmtempoError, RunFolderError
-from armtempo.encoding import decode
+from armtempo.encoding import encode
 from armtempo.model import arm_json
 from armtempo.model.arm import Arm
 from armtempo.model.joint_unit import DEG, JointUnit
@@ -54,7 +54,7 @@ def legs_of(run: RunData, plan: Plan | None) -> tuple[Trajectory, ...]:
 
 def _leg(path: Path, name: str, run: RunData) -> Trajectory:
     try:
-        return decode.trajectory(path.read_bytes(), run_folder.transmission(run.joints), name)
+        return encode.decoded(path.read_bytes(), run_folder.transmission(run.joints), name)
     except OSError as error:
         raise RunFolderError(
             f"{path}: cannot be read ({os_reason(error)}), so the planned motion is not known", RESTORE

@@ -253,9 +253,9 @@ def _said(client: Client) -> str:
 
 
 def _erasures(port: str) -> dict[str, int]:
-    from armtempo.simulator import wear  # here, as 'armtempo stop' does not need it
+    from armtempo.simulator.launcher import erasures  # here, as 'armtempo stop' does not need it
 
-    return wear.erasures(port)
+    return erasures(port)
 
 
 def _sequence(client: Client) -> SequenceStand | None:

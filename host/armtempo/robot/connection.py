@@ -8,7 +8,7 @@ from pathlib import Path
 
 from armtempo.basics.arguments import checked_as
 from armtempo.basics.errors import InputError
-from armtempo.encoding import planned_for
+from armtempo.encoding import made_with
 from armtempo.encoding.encode import arm_record
 from armtempo.link import Client
 from armtempo.model.arm import Arm
@@ -48,7 +48,7 @@ class Connection:
         if plan is None or self.arm is None or arm_record(self.arm) != arm_record(arm):
             self.configure(arm)
             return
-        planned_for.check_surroundings(f"plan {plan.name!r}", plan, self.arm)
+        made_with.check_surroundings(f"plan {plan.name!r}", plan, self.arm)
         self.configure(self.arm)  # it may have postures and frames that the plan's arm has not
 
     @contextmanager

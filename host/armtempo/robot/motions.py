@@ -27,7 +27,7 @@ from armtempo.robot.connection import Connection
 from armtempo.robot.goto import Where, posture_deg
 from armtempo.robot.jog import HeldJog
 from armtempo.robot.recording import Watcher
-from armtempo.robot.speed import change_speed, permille
+from armtempo.robot.running import change_speed, permille
 from armtempo.robot.stop_request import StopRequest
 from armtempo.robot.store import store, stored_name
 

@@ -1,4 +1,4 @@
-"""Start, follow and stop what the board runs."""
+"""Start, follow and stop what the board runs; change its speed."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from contextlib import contextmanager, suppress
 from typing import TypeVar
 
 from armtempo_shared import wire
-from armtempo_shared.messages import ONCE_NAME
+from armtempo_shared.messages import ONCE_NAME, PERMILLE, RESUME, SLOWEST_PERMILLE
 
-from armtempo.basics.errors import BoardError, LinkError, NoAnswerError, OtherBoardError
+from armtempo.basics.arguments import checked
+from armtempo.basics.errors import BoardError, InputError, LinkError, NoAnswerError, OtherBoardError
 from armtempo.encoding.encoded_plan import MotionKey
 from armtempo.link import Client
 from armtempo.link.board_messages import SequenceState
@@ -219,3 +220,26 @@ def readable(notices: tuple[str, ...]) -> tuple[str, ...]:
     from armtempo.deploy.program_files import in_full  # imported here, because it reads the whole program
 
     return tuple(map(in_full, notices))
+
+
+@checked
+def permille(fraction: float) -> int:
+    """A fraction of the planned speed, 0.01 to 1, in thousandths; raises InputError for another."""
+    rate = round(fraction * PERMILLE)
+    if not SLOWEST_PERMILLE <= rate <= PERMILLE:
+        raise InputError(
+            f"a speed of {fraction:g} times the planned one, {100 * fraction:g} %, is not allowed",
+            f"give a fraction of {SLOWEST_PERMILLE / PERMILLE:g} to 1 (1 to 100 % on the command line); a faster "
+            "motion needs a plan with higher limits",
+        )
+    return rate
+
+
+def change_speed(client: Client, rate: int) -> None:
+    """Set the speed of the running and of later motions to ``rate`` thousandths (0: pause, RESUME: end of the pause).
+
+    Raises BoardError if nothing moves, or the board refuses.
+    """
+    client.speed(rate)
+    if rate not in (0, RESUME):
+        client.rate = rate

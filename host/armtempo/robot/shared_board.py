@@ -51,7 +51,7 @@ class SharedBoard:
     def speed(self, fraction: float) -> None:
         """Set the speed as a fraction of the planned speed, 0.01 to 1, as ``Board.speed``; raises InputError
         otherwise."""
-        from armtempo.robot.speed import permille
+        from armtempo.robot.running import permille
 
         self._caller.ask("speed", ANSWER_S, rate=permille(fraction))
 

@@ -22,8 +22,7 @@ from armtempo.ports import claim, names
 from armtempo.ports.messages import TOPICS, Message
 from armtempo.ports.server import Server
 from armtempo.robot.board_state import BoardState
-from armtempo.robot.running import LOCK_S, fault_name, request_stop
-from armtempo.robot.speed import change_speed
+from armtempo.robot.running import LOCK_S, change_speed, fault_name, request_stop
 from armtempo.robot.stop_request import StopRequest
 
 EVERY_S = 0.5

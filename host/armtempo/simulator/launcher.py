@@ -1,7 +1,8 @@
-"""Starts a virtual board as a process with a serial port and a temporary folder."""
+"""Starts a virtual board as a process with a serial port and a temporary folder; tells the wear of its flash."""
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from armtempo.basics.errors import InputError, LinkError
+from armtempo.ports.names import is_sim, sim_flash
 from armtempo.simulator.launch_options import LaunchOptions, ProcessOptions, describe, unique_id
 
 INTERPRETER_VARIABLE = "ARMTEMPO_MICROPYTHON"
@@ -280,3 +282,30 @@ def _sweep() -> None:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             shutil.rmtree(lock.parent, ignore_errors=True)
         os.close(descriptor)
+
+
+SUFFIX = ".erasures"
+"""Of the file next to the flash's folder, as in ``hardware/chip/flash.py``."""
+
+
+def erasures(port: str) -> dict[str, int]:
+    """Erasures of each sector of the virtual board on a port; empty if nothing was erased, or it is not known."""
+    flash = _flash_of(port)
+    if flash is None:
+        return {}
+    try:
+        return {str(sector): int(count) for sector, count in json.loads(_beside(flash).read_text()).items()}
+    except (OSError, ValueError, AttributeError):
+        return {}
+
+
+def _beside(flash: Path) -> Path:
+    return flash.with_name(flash.name + SUFFIX)
+
+
+def _flash_of(port: str) -> Path | None:
+    if is_sim(port):
+        found = sim_flash(port)
+        return None if found is None else found.resolve()
+    name = FLASH_OF + os.path.basename(os.path.realpath(port))
+    return next((link.resolve() for link in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/{name}")), None)

@@ -4,15 +4,69 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 from armtempo.basics.errors import InputError, ToolError
 from armtempo.basics.progress import Progress
-from armtempo.deploy.firmware import checkout, frozen, image, toolchain
+from armtempo.deploy.firmware import checkout, frozen, image
 from armtempo.deploy.firmware.checkout import BoardDefinition, Checkout
 from armtempo.link.program_version import own_crc
+
+CROSS = "arm-none-eabi-gcc"
+INSTALL = (
+    "install it, on Debian and Ubuntu: sudo apt install make gcc gcc-arm-none-eabi libnewlib-arm-none-eabi; on macOS: "
+    "brew install --cask gcc-arm-embedded; else: Arm GNU Toolchain, arm-none-eabi, from developer.arm.com"
+)
+_TRIAL = "#include <math.h>\n#include <string.h>\n"
+"""Headers of newlib, which some systems package apart from the compiler."""
+_SAID_LINES = 12
+"""Of a program that fails, the last ones are shown."""
+_SAID_COLUMNS = 200
+
+
+def run(command: list[str], heard: Callable[[str], None]) -> str:
+    """Run a program, ``heard`` with each line that it prints; the last lines if it fails, else ""."""
+    said: list[str] = []
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
+        assert process.stdout is not None
+        try:
+            for line in process.stdout:
+                said = [*said[1 - _SAID_LINES :], line.rstrip()[:_SAID_COLUMNS]]
+                heard(line)
+        except BaseException:
+            process.terminate()
+            raise
+    return ("\n  ".join(said) or f"code {process.returncode}") if process.returncode else ""
+
+
+def check(with_mpy_cross: bool) -> None:
+    """ToolError if a program is missing; ``with_mpy_cross``: MicroPython's own compiler is still to be built."""
+    needed = ["make", CROSS, *(["gcc"] if with_mpy_cross else [])]
+    missing = [name for name in needed if shutil.which(name) is None]
+    if missing:
+        raise ToolError(f"{', '.join(missing)}: not installed, and needed to build a firmware", INSTALL)
+    done = subprocess.run(
+        [CROSS, "-xc", "-E", "-"], input=_TRIAL, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise ToolError(f"{CROSS} has no C library (newlib)", INSTALL)
+
+
+def version() -> str:
+    """What the compiler says of itself."""
+    done = subprocess.run([CROSS, "-dumpfullversion"], capture_output=True, text=True, check=False)
+    return f"{CROSS} {done.stdout.strip()}"
+
+
+def has_mpy_cross(checkout: Path) -> bool:
+    """Whether MicroPython's own compiler is built."""
+    return (checkout / "mpy-cross" / "build" / "mpy-cross").exists()
+
 
 _FILES = 330
 """That a build compiles, about; for its progress."""
@@ -30,7 +84,7 @@ def build(micropython: Path, board: str, out: Path, progress: Progress) -> image
     found = checkout.look(micropython)
     definition = checkout.board(found, board)
     checkout.check_submodules(found, definition)
-    toolchain.check(with_mpy_cross=not toolchain.has_mpy_cross(found.folder))
+    check(with_mpy_cross=not has_mpy_cross(found.folder))
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(f"{out} already exists", "name a new folder with --out")
     built = _make(found, definition, progress)
@@ -38,7 +92,7 @@ def build(micropython: Path, board: str, out: Path, progress: Progress) -> image
         definition.name,
         definition.machine,
         found.release,
-        toolchain.version(),
+        version(),
         own_crc(),
         _pieces(definition),
     )
@@ -63,7 +117,7 @@ def _make(found: Checkout, definition: BoardDefinition, progress: Progress) -> P
     shutil.rmtree(program, ignore_errors=True)
     frozen.write(program, definition.manifest)
     common = [f"-j{os.cpu_count() or 1}"]
-    if not toolchain.has_mpy_cross(found.folder):
+    if not has_mpy_cross(found.folder):
         _run(["make", "-C", str(found.folder / "mpy-cross"), *common], lambda line: None)
     count = 0
 
@@ -88,7 +142,7 @@ def _make(found: Checkout, definition: BoardDefinition, progress: Progress) -> P
 
 def _run(command: list[str], step: Callable[[str], None]) -> None:
     """Run make; ToolError with its last lines if it fails."""
-    if said := toolchain.run(command, step):
+    if said := run(command, step):
         raise ToolError(
             f"MicroPython's build failed:\n  {said}",
             f"for the whole output run {' '.join(command)}; with another version of MicroPython or of the compiler "

@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 from armtempo.basics.errors import InputError, LinkError, ToolError
 from armtempo.basics.progress import Progress
 from armtempo.deploy.changes import Tell
-from armtempo.deploy.firmware import image, toolchain
+from armtempo.deploy.firmware import build, image
 from armtempo.deploy.firmware.image import Image
 from armtempo.deploy.install import end_program
 from armtempo.deploy.remote import Remote
@@ -163,7 +163,7 @@ def _put(folder: Path, firmware: Image, tool: str, progress: Progress) -> None:
                 file, back = folder / piece.file, Path(name) / piece.file
                 command = _command(tool, back if reading else file, piece.address, size if reading else None)
                 progress(done, whole)
-                if said := toolchain.run(command, partial(_tell, progress, done, size, whole)):
+                if said := build.run(command, partial(_tell, progress, done, size, whole)):
                     raise ToolError(
                         f"{' '.join(command)} failed, and the board has no whole firmware now:\n  {said}",
                         f"flash again: {_REACH[tool]}",

@@ -6,24 +6,82 @@ Each leg from rest to rest is a separate spline: at a rest between two, five con
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from armtempo.basics.arrays import Array
 from armtempo.basics.errors import PlanError
+from armtempo.basics.progress import Progress
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
 from armtempo.planning import board_limits, checks
+from armtempo.planning.free import around
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import legs as cut
-from armtempo.planning.line.between import Between
 from armtempo.planning.line.deviation import LineDeviation, SplinePieces, proven
-from armtempo.planning.line.dwell import DWELL_SEGMENTS
 from armtempo.planning.line.follow import Followed, follow
 from armtempo.planning.line.legs import Leg
+from armtempo.planning.lower_bounds import LowerBound
+from armtempo.planning.motion_program import mean_slopes
 from armtempo.splines import bspline
+from armtempo.splines.bspline import REST_PIECES
+
+
+@dataclass(frozen=True, eq=False)
+class Between:
+    """The path of such a leg."""
+
+    angle_points_deg: Array
+    """(S + 5, J)."""
+    arrivals: tuple[int, ...]
+    """Segments before each of its via points."""
+    bound: LowerBound | None = None
+    """Lower bound for any motion through them; None for a fixed path."""
+
+    @property
+    def segments(self) -> int:
+        """All of them."""
+        return len(self.angle_points_deg) - DEGREE
+
+    @property
+    def at_knots(self) -> Array:
+        """Angles at the ends of the segments: (S + 1, J)."""
+        pieces = bspline.polynomials(self.angle_points_deg, DEGREE)
+        return np.concatenate([pieces[:, 0], pieces[-1:].sum(axis=1)])
+
+
+def between(arm: Arm, job: Job, leg: Leg, via_deg: Array, progress: Progress) -> Between:
+    """The path of a leg of a job with via angles (n + 1, J); PlanError if no free one stays in the ranges."""
+    own = via_deg[leg.first : leg.last + 1]
+    if checks.is_free(job) and np.any(np.ptp(own, axis=0) > checks.TOLERANCE):
+        return _free(arm, job, leg, own, progress)
+    points = bspline.refined(bspline.fit(own, DEGREE), REST_PIECES, DEGREE)
+    return Between(points, tuple(REST_PIECES * via for via in range(len(own))))
+
+
+def _free(arm: Arm, job: Job, leg: Leg, via_deg: Array, progress: Progress) -> Between:
+    """The free path of a separate job from rest to rest, on few segments, as all legs share the board's
+    memory."""
+    ends = [tuple(angles.tolist()) for angles in via_deg[[0, -1]]]
+    alone = replace(
+        job,
+        via=(ends[0], *job.via[leg.first + 1 : leg.last], ends[1]),
+        refine=job.refine if isinstance(job.refine, int) else REST_PIECES,
+        stops=(),
+        tool_segments=(),
+        speed_mm_s=None,
+        acceleration_mm_s2=None,
+    )
+    planned = around.motion(arm, alone, via_deg, progress, nearest=False)
+    joints = planned.trajectory.joints
+    points = np.stack([joint.angle_points_deg for joint in joints], axis=1)
+    search = planned.searches[0]
+    arrivals = joints[0].via_segments
+    assert arrivals is not None
+    return Between(points, arrivals, LowerBound(search.lower_bound_s, search.lower_bound_kind))
+
 
 DEGREE = 5
 _LINE_PIECES = 8
@@ -211,3 +269,49 @@ def _passed(one: Led, distances: Array) -> list[int]:
         nearest = int(np.argmin(np.abs(distances - place)))
         found.append(max(nearest, found[-1] + 1) if found else max(nearest, 1))
     return found
+
+
+# dwells
+DWELL_SEGMENTS = DEGREE
+"""Segments that a dwell adds to the path."""
+_LEAST_STEP = 1e-3
+"""Addition to the time axis for a dwell that is too short, as a fraction of the step before it."""
+
+
+@dataclass(frozen=True, eq=False)
+class TimedPath:
+    """A path of S segments on a time axis with ``refine`` segments per path segment."""
+
+    angle_points_deg: Array
+    """(S + 5, J)."""
+    differences_s: Array
+    """Of the time control points, (S * refine + 4,)."""
+    arrivals: tuple[int, ...]
+    """Segments before each via point."""
+    refine: int
+
+    def with_dwells(self, dwells_s: Mapping[int, float]) -> TimedPath:
+        """The path with dwells, in seconds by via point; each is at a rest, where five control points are equal.
+
+        The time axis before and after is unchanged. The four differences common to both sides of the rest are
+        duplicated, so a dwell lasts at least their sum: hundredths to tenths of a second.
+        """
+        timed = self
+        for via in sorted(dwells_s, reverse=True):
+            timed = timed._with_dwell(via, dwells_s[via])
+        return timed
+
+    def _with_dwell(self, via: int, dwell_s: float) -> TimedPath:
+        knot, shared = self.arrivals[via], DEGREE - 1
+        segments = -(-DEGREE // self.refine)
+        first, count = knot * self.refine, segments * self.refine
+        before, after = self.differences_s[: first + shared], self.differences_s[first:]
+        twice = np.concatenate([before[-shared:], np.zeros(count - shared), after[:shared]])
+        lasts_s = float(np.convolve(np.ones(count), mean_slopes(DEGREE)) @ twice)
+        step = max((dwell_s - lasts_s) / (count - shared), _LEAST_STEP * before[-1])
+        return TimedPath(
+            np.insert(self.angle_points_deg, [knot] * segments, self.angle_points_deg[knot], axis=0),
+            np.concatenate([before, np.full(count - shared, step), after]),
+            tuple(at + segments * (number > via) for number, at in enumerate(self.arrivals)),
+            self.refine,
+        )

@@ -20,11 +20,19 @@ from armtempo.planning import checks, lower_bounds, time_parameterization
 from armtempo.planning.fixed_path import Along, FixedPath, Optimum
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.line import legs as cut
-from armtempo.planning.line.between import between
 from armtempo.planning.line.deviation import LineDeviation
-from armtempo.planning.line.dwell import DWELL_SEGMENTS, TimedPath
 from armtempo.planning.line.follow import passed
-from armtempo.planning.line.line_path import DEGREE, Led, LinePath, Proven, led_legs, proven_paths
+from armtempo.planning.line.line_path import (
+    DEGREE,
+    DWELL_SEGMENTS,
+    Led,
+    LinePath,
+    Proven,
+    TimedPath,
+    between,
+    led_legs,
+    proven_paths,
+)
 from armtempo.planning.line.tool_limits import ToolLimits, along, excess, reached
 from armtempo.planning.lower_bounds import LowerBound
 from armtempo.planning.through_plan import Planned
