@@ -22,9 +22,9 @@ from typing import Any
 
 import armtempo_board
 import numpy as np
-from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended, opener
+from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended
 from armtempo_board.app.pallet import Place
-from armtempo_shared.program import EACH, MARK
+from armtempo_shared.program import EACH, FREE, MARK, STILL
 from armtempo_shared.rest_to_rest import PERCENT
 from armtempo_shared.sequence import MAX_COUNTERS
 
@@ -98,9 +98,11 @@ def run(
     names = {
         "__name__": "__main__",
         "print": work.print,
-        "open": opener(work),
+        "open": cell.opened,
         MARK: cell.at,
         EACH: cell.each,
+        STILL: cell.still,
+        FREE: cell.free,
     }
     before = vars(armtempo_board).get("cell")
     armtempo_board.cell = cell
@@ -111,6 +113,7 @@ def run(
     except SystemExit:
         pass
     finally:
+        cell.close_files()
         armtempo_board.cell = before  # type: ignore[assignment]
     return work.run
 

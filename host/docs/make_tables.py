@@ -9,6 +9,7 @@ from typing import Any
 
 from armtempo import optimise
 from armtempo.basics import toml_section
+from armtempo.model import user_program
 from armtempo.model.pallet import ArmPallet
 from armtempo.model.parts import Driver, Encoder, JointModel, Load, Motor, Safety
 from armtempo.model.tool import ArmTool
@@ -90,7 +91,7 @@ def _pallet() -> str:
 def _calls(of: type, called: str) -> str:
     lines = ["| call | what it does |", "|---|---|"]
     for name, call in vars(of).items():
-        if name.startswith("_") or not inspect.isfunction(call) or name in ("at", "each"):
+        if name.startswith("_") or not inspect.isfunction(call) or name in user_program.INTERNAL:
             continue
         given = [
             f"{one.name}={one.default!r}"

@@ -24,6 +24,7 @@ The table has
 - ``pallets``: {name: [rows, columns, layers, {tool: number of its first place above, from 0}]};
 - ``tools``: {name: {posture: [steps of each joint]}} of the postures that are others with this tool;
 - ``counters``: [names] that the source counts;
+- ``taken``: pins ("A15") and timers (2) of the arm, of a source that calls ``FREE``;
 - ``homing``: {} of a program that does not home the arm; else ``fast`` and ``slow``, as ``limits``, for both
   approaches, and ``groups``: of joints that are homed together a list of [joint, side (-1: low end, 1: high), steps
   where its switch trips, those of the range's end there, length of the range, of the longest approach, of the last way
@@ -49,6 +50,11 @@ MARK = "__at__"
 loop."""
 EACH = "__each__"
 """It calls this with the number of a line and what a loop goes through."""
+STILL = "__still__"
+"""It calls this with the number of a line, the name of a function that writes to the flash, and the function, or what
+has it."""
+FREE = "__free__"
+"""It calls this with the number of a line and the pin or timer that the program takes for itself."""
 HEAP_BYTES = 16_000
 """Heap that a program needs besides its own: its interface, and the start of a motion,"""
 HEAP_PER_BYTE = 8

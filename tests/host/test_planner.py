@@ -67,11 +67,11 @@ def test_shipped_job_keeps_its_limits_and_meets_the_paper() -> None:
 
 
 @pytest.mark.slow
-def test_joint_1_over_ten_seeds() -> None:
+def test_joint_1_over_five_seeds() -> None:
     via = tuple((angles[0],) for angles in JOB.via if isinstance(angles, tuple))
     arm = replace(ARM, joints=ARM.joints[:1])
-    totals = [planner.plan(arm, replace(JOB, via=via, seed=seed)).trajectory.duration_s for seed in range(10)]
-    assert np.median(totals) <= 6.04, f"seeds 0 to 9: {totals}"
+    totals = [planner.plan(arm, replace(JOB, via=via, seed=seed)).trajectory.duration_s for seed in range(5)]
+    assert np.median(totals) <= 6.04, f"seeds 0 to 4: {totals}"
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
@@ -87,10 +87,10 @@ def test_problem(problem: problems.Problem) -> None:
 @pytest.mark.slow
 @pytest.mark.seeds(2)
 def test_random_jobs_keep_their_limits_or_say_why_not(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """200 jobs each; bounds have their own test."""
+    """100 jobs each; bounds have their own test."""
     monkeypatch.setattr(lower_bounds, "of_path", lambda *_: LowerBound(math.ulp(0.0), "rests"))
     planned = 0
-    for number in range(200 * seed, 200 * seed + 200):
+    for number in range(100 * seed, 100 * seed + 100):
         arm, job = problems.random_problem(number)
         steps = arm.transmission.steps(np.array(job.via))
         if job.via[0] == job.via[-1] and np.all(np.abs(steps - steps[0]) < 1.0):
@@ -100,7 +100,7 @@ def test_random_jobs_keep_their_limits_or_say_why_not(seed: int, monkeypatch: py
         plan = planner.plan(arm, job)
         (check_thoroughly if number % 20 == 0 else check)(plan, f"job {number}")
         planned += 1
-    assert planned > 140
+    assert planned > 70
 
 
 @pytest.mark.slow
@@ -110,7 +110,7 @@ def test_what_the_driver_needs_is_a_limit_of_planning(timing: str) -> None:
     slow = replace(ARM.driver, pulse_us=30.0, low_us=30.0, dir_setup_us=500.0, dir_hold_us=500.0)
     fast = Limits(500.0, 5000.0, 50_000.0)
     arm = replace(ARM, driver=slow, joints=tuple(replace(each, limits=fast) for each in ARM.joints))
-    plan = planner.plan(arm, replace(JOB, timing=timing, refine=2, starts=1))
+    plan = planner.plan(arm, replace(JOB, timing=timing, refine=2, starts=1, iterations=60))
     check(plan, timing)
     rates = [
         one.speed_deg_s * joint.steps_per_deg for joint, one in zip(arm.driven, plan.extremes, strict=True)

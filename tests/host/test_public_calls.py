@@ -37,7 +37,7 @@ GIVEN_BY_US |= {"StopRequest", "Trajectory", "Watcher", "Result", "VirtualBoard"
 USERS_OWN = {"minimise.function", "minimise.rng", "launch.options"}
 """What these raise or start is the user's affair."""
 NO_CALLS = {"BoardState.of_json", "StopRequest.ask", "StopRequest.check"}
-NO_CALLS |= {"Arm.of_table", "Job.of_table", "Sequence.of_table", "Arm.read_posture"}
+NO_CALLS |= {"Arm.of_table", "Job.of_table", "Plan.of_job", "Sequence.of_table", "Arm.read_posture"}
 NO_CALLS |= {f"Watcher.{name}" for name in ("begin", "on_sample", "on_state", "end")}
 
 

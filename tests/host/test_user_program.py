@@ -86,6 +86,8 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
         ("from time import sleep as rest\nrest(1)\n", 3, "time.sleep keeps the board from its work"),
         ("import utime as t\nt.sleep_ms(20)\n", 3, "time.sleep_ms keeps the board from its work"),
         ("\nname = input('which? ')\n", 3, "waits for a terminal"),
+        ("\nexec('while True: pass')\n", 3, r"exec\(\) runs a text in which the board cannot do its work"),
+        ("x = [eval('1 + 1')]\n", 2, r"eval\(\) runs a text"),
         ("import machine\nmachine.reset()\n", 3, "restarts the board, and the arm's position is lost"),
         ("from machine import Pin\nPin('PA15', Pin.OUT)\n", 3, "PA15 is taken for STEP of channel 1"),
         ("import pyb\nled = pyb.Pin(pyb.Pin.board.E12)\n", 3, "PE12 is taken for ENABLE of the drivers"),
@@ -472,10 +474,28 @@ def test_what_a_program_raises_passes_and_endless_ones_end(
     assert run.said == ["a", "b"]  # as the host is told
     with pytest.raises(CellError, match="more than 8 counters"):
         testing.run(written("for n in range(9):\n    cell.count('n%d' % n)\n", tmp_path), ARM)
-    with pytest.raises(CellError, match="'log' cannot be written while the arm moves"):
+    with pytest.raises(CellError, match="'log': the flash cannot be written while the arm moves"):
         testing.run(
             written("cell.goto([5, -60, 40], wait=False)\nopen('log', 'a')\n", tmp_path), ARM, motion_s=1.0
         )
+    monkeypatch.chdir(tmp_path)
+    log = "import os\nlog = open('log', 'w')\nlog.write('x')\n"
+    with pytest.raises(CellError, match="'log' is still open for writing: close it before the arm moves"):
+        testing.run(written(f"{log}cell.goto([5, -60, 40])\n", tmp_path), ARM)
+    assert (tmp_path / "log").read_text() == "x"
+    moves = f"{log}log.close()\ncell.goto([5, -60, 40], wait=False)\n"
+    for call in ("os.remove('log')", "os.rename('log', 'old')", "from os import mkdir as make; make('new')"):
+        with pytest.raises(CellError, match=r"os\.\w+: the flash cannot be written while the arm moves"):
+            testing.run(written(f"{moves}{call}\n", tmp_path), ARM, motion_s=1.0)
+    testing.run(written(f"{moves}cell.wait()\nos.remove('log')\n", tmp_path), ARM, motion_s=1.0)
+    assert not (tmp_path / "log").exists()
+    monkeypatch.setitem(sys.modules, "machine", ModuleType("machine"))
+    monkeypatch.setattr(sys.modules["machine"], "Pin", lambda pin: pin, raising=False)
+    pins = "from machine import Pin\nfor pin in ('PC12', '{}'):\n    Pin(pin)\n"
+    testing.run(written(pins.format("PC11"), tmp_path), ARM)
+    for pin in ("PA15", "E7", "PB8"):
+        with pytest.raises(CellError, match=f"pin {pin[-3:].lstrip('P')} is taken by the arm"):
+            testing.run(written(pins.format(pin), tmp_path), ARM)
     with pytest.raises(NameError):
         testing.run(written("print(__file__)\n", tmp_path), ARM)
     source = (

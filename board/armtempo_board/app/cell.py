@@ -75,7 +75,7 @@ if TYPE_CHECKING:
             """Show a text to the host."""
 
         def will_write(self) -> None:
-            """The program opens a file for writing: nothing of it may be left to write when a motion starts."""
+            """The program writes to the flash: nothing of it may be left to write when a motion starts."""
 
 
 TOO_MANY_COUNTERS = "more than %d counters" % MAX_COUNTERS
@@ -106,6 +106,7 @@ class Cell:
         self._work = work
         self.tool_name = ""
         self._pallets: "dict[str, Pallet]" = {}
+        self._files: "list[tuple[str, Any]]" = []  # that it has opened for writing
 
     # moving
 
@@ -115,6 +116,7 @@ class Cell:
         if not plan:
             raise CellError("the program's text has no call of home")
         self._rest()
+        self._check_files()
         self._work.home(plan)
 
     def goto(self, posture: "str | Place | Sequence[float]", speed: float = 1.0, wait: bool = True) -> None:
@@ -128,6 +130,7 @@ class Cell:
         percent = _percent(speed)
         self._rest()
         if target != self._work.steps():
+            self._check_files()
             self._work.begin_move(target, percent)
         if wait:
             self._rest()
@@ -142,6 +145,7 @@ class Cell:
         _check_name("motion", motion)
         percent = _percent(speed)
         self._rest()
+        self._check_files()
         self._work.begin_motion(motion, percent)
 
     def moving(self) -> bool:
@@ -273,6 +277,51 @@ class Cell:
             self.at(line)
             yield value
 
+    def still(self, line: int, call: str, value: "Any") -> "Any":
+        """The program is at this line, in a ``call`` of ``value`` that writes to the flash: Error while it moves."""
+        self._work.note_line(line)
+        self._check_still(call)
+        return value
+
+    def free(self, line: int, value: "Any") -> "Any":
+        """The program is at this line, where it takes a pin or timer: Error if that is the arm's."""
+        self._work.note_line(line)
+        name = value.name() if hasattr(value, "name") else value
+        if isinstance(name, str):
+            name = name.lstrip("P")
+        if name in self._table.get("taken", ()):  # absent in a record of an older host
+            raise CellError("%s %s is taken by the arm" % ("pin" if isinstance(name, str) else "timer", name))
+        return value
+
+    # in the place of ``open``
+
+    def opened(self, path: str, mode: str = "r", **more: "Any") -> "Any":
+        """A file; for writing only at rest, as the chip stands still while its flash is written."""
+        if not mode.strip("rbt"):
+            return open(path, mode, **more)
+        self._check_still("open: %r" % path)
+        file = open(path, mode, **more)  # noqa: SIM115  the program closes it
+        self._files.append((path, file))
+        return file
+
+    def close_files(self) -> None:
+        """Close what the program has left open."""
+        for _, file in self._files:
+            file.close()
+
+    def _check_still(self, what: str) -> None:
+        if self._work.moving():
+            raise CellError(
+                "%s: the flash cannot be written while the arm moves; cell.wait() waits for rest" % what
+            )
+        self._work.will_write()
+
+    def _check_files(self) -> None:
+        """Raise Error if a file is open for writing, as what is in it would be written while the arm moves."""
+        self._files = [(path, file) for path, file in self._files if _is_open(file)]
+        for path, _ in self._files:
+            raise CellError("%r is still open for writing: close it before the arm moves" % path)
+
     def _rest(self) -> None:
         """Wait for the end of a motion."""
         self._work.serve()
@@ -311,19 +360,12 @@ class Cell:
         return found[name]
 
 
-def opener(work: "Work") -> "Any":
-    """``open`` for a program: for writing only at rest, as the chip stands still while its flash is written."""
-
-    def opened(path: str, mode: str = "r", **more: "Any") -> "Any":
-        if mode.strip("rbt"):
-            if work.moving():
-                raise CellError(
-                    "open: %r cannot be written while the arm moves; cell.wait() waits for rest" % path
-                )
-            work.will_write()
-        return open(path, mode, **more)
-
-    return opened
+def _is_open(file: "Any") -> bool:
+    try:
+        file.flush()
+    except (OSError, ValueError):
+        return False
+    return True
 
 
 def _check_name(word: str, name: "Any") -> None:

@@ -17,7 +17,7 @@ from micropython import const
 
 import armtempo_board
 from armtempo_board import step_rates
-from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended, opener
+from armtempo_board.app.cell import TOO_MANY_COUNTERS, Cell, CellError, Ended
 from armtempo_board.app.sequence_command import STEP
 from armtempo_board.app.sequencer import Sequencer
 from armtempo_board.code_names import name_of
@@ -90,9 +90,11 @@ class UserProgram(Sequencer):
         names = {
             "__name__": "__main__",
             "print": self._print,
-            "open": opener(self),
+            "open": cell.opened,
             program.MARK: cell.at,
             program.EACH: cell.each,
+            program.STILL: cell.still,
+            program.FREE: cell.free,
         }
         source, self._source = self._source, ""
         code = compile(source, self.table["file"], "exec")
@@ -105,6 +107,7 @@ class UserProgram(Sequencer):
             exec(code, names)
         finally:
             self._app.runs_program = False
+            cell.close_files()
             del armtempo_board.cell
             _forget_modules(before)
 

@@ -16,7 +16,7 @@ from armtempo.encoding import encode, encoded_plan, made_with
 from armtempo.encoding.encoded_plan import Encoded, MotionKey
 from armtempo.kinematics.chain import all_angles_deg
 from armtempo.kinematics.of_arm import forward
-from armtempo.model import home_switches
+from armtempo.model import home_switches, program_calls
 from armtempo.model.arm import Arm
 from armtempo.model.home_switches import HomeSwitch
 from armtempo.model.outputs import SWITCH, Output
@@ -117,6 +117,7 @@ def table(arm: Arm, found: UserProgram, places: Places) -> dict[str, Any]:
         "pallets": _shapes(arm, places),
         "tools": {tool: _others(bare, _postures(arm.with_tool(tool))) for tool in found.tools},
         "homing": _homing(arm) if found.homes else {},
+        **({"taken": program_calls.taken(arm)} if found.takes else {}),
     }
 
 

@@ -1,6 +1,7 @@
 """What a user's program may not call of MicroPython: it would keep the board from its work, or take what the arm uses.
 
-Found in the text, by the names of modules, also imported ones; what a program puts together itself is not seen.
+Found in the text, by the names of modules, also imported ones. Pins and timers that are no numbers or texts there are
+looked at when the program takes them, by marks (``user_program``).
 """
 
 from __future__ import annotations
@@ -63,6 +64,9 @@ _REFUSED = {
 }
 _PINS = ("machine.Pin", "pyb.Pin", "machine.ADC", "pyb.ADC", "pyb.ExtInt")
 _TIMER = "pyb.Timer"
+_BUILT_IN = ("input", "exec", "eval")
+FLASH = ("os.remove", "os.unlink", "os.rename", "os.mkdir", "os.rmdir", "os.sync", "os.umount")
+"""Calls that write to the flash."""
 _OWN = ("armtempo_board", "armtempo_shared")
 _COROUTINE = "serve"
 
@@ -78,7 +82,7 @@ class CallProblem:
 
 def problems(tree: ast.Module, arm: PinUser, cell: str) -> Iterator[CallProblem]:
     """All, in the order of ``ast.walk``; ``cell``: its name in the program."""
-    names = _imported(tree)
+    names = imported(tree)
     tasks = {node.name for node in tree.body if isinstance(node, ast.AsyncFunctionDef)}
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
@@ -88,11 +92,11 @@ def problems(tree: ast.Module, arm: PinUser, cell: str) -> Iterator[CallProblem]
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             yield from _never_awaited(node.value, tasks, cell)
         elif isinstance(node, ast.Call):
-            called = _dotted(node.func, names)
+            called = dotted(node.func, names)
             yield from _of_call(node, called, arm, cell)
 
 
-def _imported(tree: ast.Module) -> dict[str, str]:
+def imported(tree: ast.Module) -> dict[str, str]:
     """What the names are that a program imports: "time" or "time.sleep", also of MicroPython's old names ("utime")."""
     found = {}
     for node in ast.walk(tree):
@@ -109,12 +113,12 @@ def _plain(module: str) -> str:
     return module[1:] if module in ("utime", "uos", "umachine") else module
 
 
-def _dotted(node: ast.expr, names: dict[str, str]) -> str:
+def dotted(node: ast.expr, names: dict[str, str]) -> str:
     """The full name of what is called; "" if it is not one that was imported, or built in."""
     if isinstance(node, ast.Name):
-        return names.get(node.id, node.id if node.id == "input" else "")
+        return names.get(node.id, node.id if node.id in _BUILT_IN else "")
     if isinstance(node, ast.Attribute):
-        base = _dotted(node.value, names)
+        base = dotted(node.value, names)
         return base and f"{base}.{node.attr}"
     return ""
 
@@ -169,6 +173,12 @@ def _of_call(node: ast.Call, called: str, arm: PinUser, cell: str) -> Iterator[C
             "input() waits for a terminal, which the board does not have",
             f"wait for an input of the arm file: {cell}.wait(name)",
         )
+    elif called in _BUILT_IN:
+        yield CallProblem(
+            node.lineno,
+            f"{called}() runs a text in which the board cannot do its work, nor tell the line",
+            "write it into the program",
+        )
     elif called in _REFUSED:
         what, next_step = _REFUSED[called]
         yield CallProblem(node.lineno, what.format(call=called), next_step.format(cell=cell))
@@ -199,6 +209,17 @@ def _pin(node: ast.expr) -> str:
         node.value if isinstance(node, ast.Constant) else node.attr if isinstance(node, ast.Attribute) else ""
     )
     return f"P{text.removeprefix('P')}" if isinstance(text, str) else ""
+
+
+def takes(called: str) -> bool:
+    """Whether what is called takes a pin or a timer."""
+    return called in _PINS or called == _TIMER
+
+
+def taken(arm: PinUser) -> list[str | int]:
+    """The pins and timers of an arm, and of its outputs and inputs, as the board names them."""
+    timers = {*engine_pins.taken_timers(arm), *(place.timer for place in pin_use.timer_outputs(arm).values())}
+    return [*sorted(pin.removeprefix("P") for pin in _uses(arm)), *sorted(timers)]
 
 
 def _uses(arm: PinUser) -> dict[str, str]:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from armtempo_board.app.cell import Cell
-from armtempo_shared.program import EACH, MARK
+from armtempo_shared.program import EACH, FREE, MARK, STILL
 from armtempo_shared.sequence import MAX_COUNTERS
 
 from armtempo.basics import number_table
@@ -29,7 +29,8 @@ from armtempo.model.parts import NOTHING
 
 _PACKAGE, _CELL = "armtempo_board", "cell"
 _CALLS = {name: value for name, value in vars(Cell).items() if not name.startswith("_")}
-_INTERNAL = ("at", "each")
+INTERNAL = ("at", "each", "still", "free", "opened", "close_files")
+"""Those of them that a program does not call itself."""
 _LEAST_BEYOND_STEPS = 1.0
 """The board rounds to whole steps: what is less beyond a range may be its end."""
 
@@ -50,6 +51,8 @@ class UserProgram:
     tools: dict[str, int]
     homes: int = 0
     """The line in which it homes the arm; 0: it does not."""
+    takes: bool = False
+    """Whether it takes pins or timers that are not in its text."""
 
     @property
     def file(self) -> str:
@@ -82,11 +85,12 @@ class UserProgram:
         reader = _Reader(path, arm, _cell_name(tree, path))
         reader.read(tree)
         try:
-            marked = _Marks(source, reader.cell).marked(tree)
+            marks = _Marks(source, reader.cell)
+            marked = marks.marked(tree)
         except RecursionError:
             raise _too_deep(path) from None
         named = reader.postures, reader.motions, reader.counters, reader.pallets, reader.tools
-        return cls(path.stem, path, source, marked, *named, reader.homes)
+        return cls(path.stem, path, source, marked, *named, reader.homes, marks.takes)
 
 
 def _too_deep(path: Path) -> InputError:
@@ -140,8 +144,8 @@ class _Reader:
         return f"{self.path}, line {getattr(node, 'lineno', 1)}: "
 
     def _known(self, node: ast.Attribute) -> None:
-        if node.attr not in _CALLS or node.attr in _INTERNAL:
-            names = [name for name in _CALLS if name not in _INTERNAL]
+        if node.attr not in _CALLS or node.attr in INTERNAL:
+            names = [name for name in _CALLS if name not in INTERNAL]
             raise InputError(
                 f"{self._place(node)}the cell has no {node.attr!r}{did_you_mean(node.attr, names)}",
                 f"it has {', '.join(names)}",
@@ -261,13 +265,15 @@ class _Marks:
         self._lines = source.encode().splitlines(keepends=True)
         self._cell = cell
         self._texts: list[tuple[int, int, int, bytes]] = []  # line, byte, order, text
+        self._names: dict[str, str] = {}
+        self.takes = False  # whether it takes pins or timers that are not in its text
 
     def marked(self, tree: ast.Module) -> str:
         """The source with its marks."""
+        self._names = program_calls.imported(tree)
         for node in _visible(tree):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-                if _is_name(node.func.value, self._cell):
-                    self._around(node.func.value, f"{MARK}({node.lineno}, ", ")")
+            if isinstance(node, ast.Call):
+                self._mark_call(node)
             elif isinstance(node, ast.While):
                 self._around(node.test, f"{MARK}({node.lineno}) and (", ")")
             elif isinstance(node, ast.For) or (isinstance(node, ast.comprehension) and not node.is_async):
@@ -276,6 +282,22 @@ class _Marks:
             row = self._lines[line - 1]
             self._lines[line - 1] = row[:at] + text + row[at:]
         return b"".join(self._lines).decode()
+
+    def _mark_call(self, node: ast.Call) -> None:
+        """A call of the cell, or one that writes to the flash, or takes a pin or timer that is not in the text."""
+        if isinstance(node.func, ast.Attribute) and _is_name(node.func.value, self._cell):
+            self._around(node.func.value, f"{MARK}({node.lineno}, ", ")")
+        called = program_calls.dotted(node.func, self._names)
+        if called in program_calls.FLASH:
+            base = node.func.value if isinstance(node.func, ast.Attribute) else node.func
+            self._around(base, f'{STILL}({node.lineno}, "{called}", ', ")")
+        elif program_calls.takes(called) and node.args and not self._is_plain(node.args[0]):
+            self.takes = True
+            self._around(node.args[0], f"{FREE}({node.lineno}, ", ")")
+
+    def _is_plain(self, node: ast.expr) -> bool:
+        """Whether an argument is seen in the text, as "PA15" or Pin.cpu.A15, or is none that can be marked."""
+        return isinstance(node, ast.Constant | ast.Starred) or bool(program_calls.dotted(node, self._names))
 
     def _around(self, node: ast.expr, before: str, after: str) -> None:
         """Put texts around a node; the marks of an outer one, which is visited first, go around those of an inner."""

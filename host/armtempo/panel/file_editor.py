@@ -141,13 +141,19 @@ class FileEditor(ABC):
         return self._write(file)
 
     def save_as(self, name: str) -> Path:
-        """Write it under another name, which becomes the edited one; raises InputError as ``save``."""
+        """Write it under another name, which becomes the edited one; raises InputError, with no change, as ``save``."""
         self._check_name(name)
         file = self.folder / f"{name}.toml"
         if file.exists():
             raise InputError(f"{file.name} exists already", "give another name")
+        before, undo = self.text, self._undo
         self.set_option("name", name)
-        return self._write(file)
+        try:
+            return self._write(file)
+        except InputError:
+            self._set(before)
+            self._undo = undo
+            raise
 
     @property
     def target(self) -> Path:

@@ -277,6 +277,9 @@ class PanelBoard(BoardLink):
     def run_sequence(self, sequence: Plan | str) -> None:
         """Run a planned sequence, stored in the place of another one of its name; or the stored one of that name."""
         take = self.live.take_sequence
+        if not isinstance(sequence, str):  # many motions take half a minute
+            self.upload(sequence)
+            self.part(0.0, 0.0)
         take(self.board.run_sequence(sequence, take, self._stop, replace=True, out=self.runs))
 
     def deploy(self) -> None:

@@ -11,6 +11,7 @@ from armtempo.basics.errors import ArmtempoError, InputError
 from armtempo.kinematics.of_arm import forward
 from armtempo.model.arm import Arm
 from armtempo.model.job import Job
+from armtempo.panel import file_editor
 from armtempo.panel.job_editor import JobEditor
 from armtempo.panel.toml_blocks import TomlBlocks
 from armtempo.panel.via_rows import ANGLES, POSE, Via
@@ -225,9 +226,9 @@ def test_a_plan_is_old_after_a_change(editor: JobEditor) -> None:
     assert editor.plan is None
 
 
-@pytest.mark.parametrize("change", ["other program", "outside", "invalid", "exists"])
+@pytest.mark.parametrize("change", ["other program", "outside", "invalid", "exists", "full"])
 def test_what_cannot_be_saved_is_refused_and_nothing_is_written(
-    editor: JobEditor, tmp_path: Path, change: str
+    editor: JobEditor, tmp_path: Path, change: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert editor.file is not None
     file = editor.file
@@ -242,12 +243,22 @@ def test_what_cannot_be_saved_is_refused_and_nothing_is_written(
     elif change == "invalid":
         editor.set_angle(0, 0, "999")
         said, call = "within the range of joint 1", editor.save
+    elif change == "full":
+
+        def full(file: Path, text: str) -> None:
+            raise InputError("No space left on device", "free some")
+
+        monkeypatch.setattr(file_editor, "replace_text", full)
+        editor.set_angle(0, 0, "2")
+        said, call = "No space left", lambda: editor.save_as("other")
     else:
         said, call = "rows.toml exists already", lambda: editor.save_as("rows")
+    edited = editor.text, editor.file, editor.can_undo
     before = {path: path.read_text() for path in tmp_path.glob("*.toml")}
     with pytest.raises(InputError, match=said):
         call()
     assert {path: path.read_text() for path in tmp_path.glob("*.toml")} == before
+    assert (editor.text, editor.file, editor.can_undo) == edited
 
 
 def test_a_job_is_saved_under_another_name(editor: JobEditor) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from armtempo.basics.errors import InputError, LinkError, PortInUseError
+from armtempo.basics.progress import Progress
 from armtempo.model.arm import Arm
 from armtempo.panel import words
 from armtempo.panel.job_editor import JobEditor
@@ -180,3 +181,17 @@ def test_what_moves_is_compared_with_no_plan_but_its_own(operator: PanelBoard) -
     do(operator, "sequence", ME, lambda: None)
     wait(lambda: not operator.busy)
     assert operator.live.plan is None
+
+
+def test_a_sequence_is_stored_with_progress_before_it_is_run(operator: PanelBoard) -> None:
+    seen: list[float] = []
+    plan: Any = object()
+
+    def upload(plan: object, replace: bool, progress: Progress) -> None:
+        progress(1, 2)
+        seen.append(operator.progress)
+
+    operator.board.upload = upload  # type: ignore[method-assign, assignment]
+    operator.run_sequence(plan)
+    assert (seen, operator.progress) == ([0.5], 0.0)
+    assert [call[:2] for call in operator.board.calls] == [("run_sequence", plan)]  # type: ignore[attr-defined]

@@ -221,24 +221,83 @@ def case_what_is_not_possible_is_an_exception_with_words():
 
 
 def case_what_a_program_writes_is_in_the_flash_before_it_moves():
-    synced = []
-
-    class Os:
-        def sync(self):
-            synced.append(world.board.engine.moving)
-
     world = World(
         "open('/dev/null').close()\ncell.goto('there')\nopen('/dev/null', 'w').close()\ncell.goto('home', wait=False)\n"
         "try:\n    open('/dev/null', 'a')\nexcept cell.Error as error:\n    print(error)\n",
         arrives_slowly,
     )
     assert world.start()[0] == "ok"
-    module = sys.modules["armtempo_board.app.user_program"]
-    module.os = Os()
+    synced = world.count_syncs()
     world.execute()
     assert world.stands()[0] == "finished"
     assert synced == [False], synced
-    assert world.said()[0].startswith("open: '/dev/null' cannot be written while the arm moves"), world.said()
+    (said,) = world.said()
+    assert said.startswith("open: '/dev/null': the flash cannot be written while the arm moves"), said
+
+
+STILL_OPEN = """
+import os
+cell.goto('there', wait=False)
+try:
+    __still__(4, 'os.remove', os).remove('none')
+except cell.Error as error:
+    print(error)
+cell.wait()
+try:
+    __still__(9, 'os.remove', os).remove('/none')
+except OSError:
+    print('none')
+class File:
+    closed = False
+    def flush(self):
+        if self.closed:
+            raise ValueError
+    def close(self):
+        self.closed = True
+file = File()
+cell._files.append(('log', file))
+try:
+    cell.goto('home')
+except cell.Error as error:
+    print(error)
+file.close()
+cell.goto('home')
+"""
+
+
+def case_what_writes_to_the_flash_waits_for_rest():
+    """Calls that the host has marked, and a file that is left open."""
+    world = World(STILL_OPEN, arrives_slowly)
+    assert world.start()[0] == "ok"
+    synced = world.count_syncs()
+    world.execute()
+    assert synced == [False], synced
+    said = world.said()
+    assert said[0].startswith("os.remove: the flash cannot be written while the arm moves"), said
+    assert said[1:] == ["none", "'log' is still open for writing: close it before the arm moves"], said
+    assert world.stands()[0] == "finished"
+
+
+PINS = """
+class Pin:
+    def name(self):
+        return 'A15'
+for free in 'PC12', 'C12', 12, -1, None:
+    assert __free__(4, free) is free
+for taken in 'PA15', 'A15', 2, Pin():
+    try:
+        __free__(6, taken)
+    except cell.Error as error:
+        print(error)
+"""
+
+
+def case_pins_and_timers_of_the_arm_are_refused():
+    world = World(PINS, taken=["A15", "E7", 2, 5])
+    assert world.start()[0] == "ok"
+    world.execute()
+    said = world.said()
+    assert said == ["pin A15 is taken by the arm"] * 2 + ["timer 2 is taken by the arm", said[0]], said
 
 
 def case_marks_serve_a_loop_without_calls_and_tell_its_line():
