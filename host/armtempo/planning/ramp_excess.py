@@ -43,10 +43,6 @@ _ALIKE = 1e-9  # differences of control points over their largest distance
 _LEAST_EXCESS = 1e-6
 _QUIET = 0.1  # of the largest acceleration and jerk: between the ramps at a motion's ends there is no more
 _AROUND = 1.2  # times those ramps is where a table's entries are close
-np.empty(8 << 20, np.uint8)
-"""glibc keeps the memory that arrays leave, up to twice the largest block that was freed (mallopt(3),
-M_MMAP_THRESHOLD). Without this one, which is never written, it gives the memory back after each call of ``excess``,
-and the system zeroes it again, page by page: 1500 times in the plan of a jog, a quarter of its time."""
 _SHAPES, _WAYS = np.frombuffer(RAMP_SHAPES, np.uint8), np.frombuffer(RAMP_WAYS, np.uint8)
 
 
