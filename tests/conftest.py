@@ -9,7 +9,7 @@ import shutil
 import signal
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,8 +20,6 @@ from tests import interpreters
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # Started in the background: the commands that the tests start would inherit it and not mind Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-
-gc.disable()  # until all is collected: hardly anything of that is garbage, and looking for it takes a tenth of the time
 
 NEEDS = {
     "board/test_cortex_m4.py": "unicorn",
@@ -100,6 +98,16 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> 
     return LeftOut.from_parent(parent, path=module_path) if _missing(module_path) else None
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Hardly anything that is imported and collected is garbage, and looking for it takes a tenth of the time."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """All of ``system/`` is slow. Several workers begin with what takes long, so that they end together."""
     kept = [item for item in items if config.getoption("long") or not item.get_closest_marker("long")]
@@ -130,7 +138,6 @@ def _brief(items: list[pytest.Item]) -> list[pytest.Item]:
 
 def pytest_collection_finish() -> None:
     """What was imported and collected stays: looked through with all else, it takes a tenth of the tests' time."""
-    gc.enable()
     gc.collect()
     gc.freeze()
 

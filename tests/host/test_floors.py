@@ -400,7 +400,7 @@ def evaluated(trajectory: Trajectory, limits: list[Limits], monkeypatch: pytest.
 
     def counted(ramps: ramp_excess.Ramps, starts: Array, *rest: Any) -> Array:
         _, rates, _, phases = rest
-        found.append(len(starts) * len(rates) * 3 * phases * len(ramps._joints))
+        found.append(len(starts) * len(rates) * 3 * phases * len(ramps._factors))
         return excess(ramps, starts, *rest)
 
     with monkeypatch.context() as patched:

@@ -387,8 +387,8 @@ def test_a_plan_takes_few_and_small_matrices() -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(motion_program, "ReducedKkt", Counted)
         planner.plan(arm, replace(job, starts=1))
-    assert len(counted) <= 50
-    assert sum(counted) <= 110_000_000, "operations of Cholesky's factors"
+    assert len(counted) <= 40
+    assert sum(counted) <= 85_000_000, "operations of Cholesky's factors"
 
 
 def test_rows_of_a_free_path_have_their_derivatives_and_the_products_of_these() -> None:

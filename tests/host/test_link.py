@@ -266,22 +266,6 @@ def test_no_command_has_ctrl_c_for_its_number(tmp_path: Path) -> None:
 # a line that damages bytes: what arrives is right, or the host says why not
 
 
-@pytest.mark.long
-@pytest.mark.slow
-def test_a_hundred_uploads_over_a_bad_line_arrive_identical(tmp_path: Path) -> None:
-    to_board, from_board = Noise("to", 0.01), Noise("from", 0.01)
-    pipe = Pipe(tmp_path / "flash", to_board, from_board)
-    board = connect(pipe)
-    numbers = random.Random(1)
-    board.upload(wire.ARM_RECORD_NAME, ARM)
-    for number in range(100):
-        data = random_motion(numbers, segments=numbers.randrange(1, 4), joints=1)
-        board.upload("feed", data)
-        assert (tmp_path / "flash" / "feed.atm").read_bytes() == data, f"upload {number}"
-    assert to_board.hits > 200
-    assert from_board.hits > 30
-
-
 @pytest.mark.slow
 @pytest.mark.seeds(0, 1, 2)
 def test_runs_over_a_bad_line_are_complete(tmp_path: Path, seed: int) -> None:

@@ -21,7 +21,7 @@ from armtempo_shared.limits import TICK_HZ
 from tests import interpreters
 from tests.system import commandline, sequences
 from tests.system.conftest import FASTEST
-from tests.system.sequences import ARM, FOLDER, GRIPPER, net_steps, part_lies_there, small
+from tests.system.sequences import ARM, GRIPPER, net_steps, part_lies_there, small
 
 CYCLES = 5
 LEGS = 3
@@ -103,42 +103,6 @@ def test_whatever_ends_it_leaves_a_board_that_says_where(tmp_path: Path) -> None
         assert board.status().state == "idle"
 
 
-@pytest.mark.long
-def test_from_the_command_line(tmp_path: Path) -> None:
-    """Plan, store, list, run by file and by name; a changed one replaces it and takes its old motions along."""
-
-    def said(*arguments: str, code: int = 0, port: str = "sim:board") -> str:
-        done = commandline.run(*arguments, folder=tmp_path, ARMTEMPO_PORT=port)
-        assert done.exit_code == code, done.output + done.errors
-        return done.output + done.errors
-
-    arm = str(FOLDER / "arm.toml")
-    path = tmp_path / "s.toml"
-    text = (
-        f'name = "s"\narm = "{arm}"\nstart = "home"\n[[step]]\nrepeat = 2\n[[step]]\ngoto = [0.5, -60, 40]\n'
-    )
-    text += '[[step]]\noutput = "gripper"\nto = "closed"\nwait_s = 0.1\n'
-    text += '[[step]]\ngoto = "home"\n[[step]]\ncount = "parts"\n[[step]]\nend = "repeat"\n'
-    path.write_text(text)
-    told = said("plan", "s.toml")
-    assert "cycle (step 1, 2 times):" in told
-    assert "in 2 motions + 0.100 s waits" in told
-    assert "s: sequence and 2 motions stored" in said("upload", "s.json", "--default")
-    listed = said("list", "--arm", arm)
-    assert [line.split()[0] for line in listed.splitlines() if line.startswith("s")] == ["s", "s-1", "s-2"]
-    assert "finished after 2 whole cycles; parts 2" in said("run", "s.json")
-    assert "finished after 2 whole cycles" in said("run", "s", "--arm", arm)
-    assert "--repeat: not for a sequence" in said("run", "s.json", "--repeat", "2", code=2)
-    path.write_text(text.replace("goto = [0.5, -60, 40]", 'goto = "home"'))
-    said("plan", "s.toml")
-    assert "--force" in said("upload", "s.json", code=1)
-    said("upload", "s.json", "--force")
-    assert [line.split()[0] for line in said("list", "--arm", arm).splitlines() if line.startswith("s")] == [
-        "s"
-    ]
-    said("plan", "s.toml", "--refine", "4", code=2)
-
-
 # ``armtempo demo --pick-and-place``: the shipped sequence, with the part sensor imitated
 
 
@@ -208,23 +172,6 @@ def test_every_row_and_sample_is_recorded(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_an_error_of_the_caller_stops_it(tmp_path: Path) -> None:
-    """Nobody follows it any more; a cable that is out is no such error."""
-    plan = small(tmp_path, "for ever")
-    with launch(options()) as process, armtempo.connect(process.port, ARM) as board:
-        board.home(ARM)
-        with pytest.raises(ZeroDivisionError):
-            board.run_sequence(plan, lambda state: print(1 // (state.row < 1)), out=tmp_path / "runs")
-        while (state := board.client.sequence()).ending == "running":
-            pass
-        assert state.ending == "stopped"
-        assert board.last_sequence
-        assert board.last_sequence.state == "broken"
-        board.goto(plan)
-        assert board.run_sequence(small(tmp_path, 1), replace=True).ending == "finished"
-
-
-@pytest.mark.long
 def test_after_a_power_failure_the_folder_says_where_it_stood(tmp_path: Path) -> None:
     """The board forgets it: its flash is not written while a sequence runs."""
     plan = small(tmp_path, "for ever")
@@ -254,30 +201,3 @@ def test_after_a_power_failure_the_folder_says_where_it_stood(tmp_path: Path) ->
     with (found.path / "rows-01.csv").open("a") as file:
         file.write("99,1")  # cut in the midst of a line
     assert armtempo.Run.load(found.path).rows == found.rows
-
-
-@pytest.mark.long
-def test_recorded_from_the_command_line(tmp_path: Path) -> None:
-    plan = small(tmp_path, 2)
-    plan.save(tmp_path / "small.json")
-    report = "runs/small-001"
-    fitted = tmp_path / "arm.toml"
-    fitted.write_text(
-        (FOLDER / "arm.toml").read_text().replace("estop_fitted = false", "estop_fitted = true")
-    )
-    with launch(options()) as process:
-
-        def said(*arguments: str, code: int = 0) -> str:
-            done = commandline.run(*arguments, folder=tmp_path, ARMTEMPO_PORT=process.port)
-            assert done.exit_code == code, done.output + done.errors
-            return done.output
-
-        with armtempo.connect(process.port, ARM) as board:
-            board.home(ARM)
-        assert f"recorded in {report}" in said("run", "small.json")
-        told = json.loads(said("run", "small", "--arm", str(fitted), "--json").splitlines()[-1])
-    assert (told["ending"], told["cycles"], told["counters"]) == ("finished", 2, {"parts": 2})
-    assert told["folder"].endswith("small-002")
-    assert said("report", report).startswith(f"wrote {report}/report.html")
-    assert (tmp_path / report / "report.html").is_file()
-    assert armtempo.Run.load(tmp_path / report).complete

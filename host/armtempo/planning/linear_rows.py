@@ -52,13 +52,17 @@ class WindowRows:
 
     def hessian(self, weights: Array, of_rows: Array) -> Array:
         """Sums of the outer products of weights (R, w) with factors >= 0 (R,), at ``rows`` and ``columns``."""
-        scaled = np.zeros((len(weights) + 1, weights.shape[1]))
-        scaled[:-1] = weights * np.sqrt(of_rows)[:, None]
-        each = scaled[self._chunks]
+        scaled = np.empty((len(weights) + 1, weights.shape[1]))
+        np.multiply(weights, np.sqrt(of_rows)[:, None], out=scaled[:-1])
+        scaled[-1] = 0.0
+        each = np.take(scaled, self._chunks, axis=0)
         products = (each.swapaxes(1, 2) @ each).reshape(len(each), -1)
         found = np.zeros(self._shape)
-        for used, chunks in self._added:
-            found[used] += products[chunks]
+        for number, (used, chunks) in enumerate(self._added):
+            if number == 0 and len(used) == len(found):
+                found = np.take(products, chunks, axis=0)
+            else:
+                found[used] += products[chunks]
         return found.ravel()
 
 

@@ -43,10 +43,6 @@ _ALIKE = 1e-9  # differences of control points over their largest distance
 _LEAST_EXCESS = 1e-6
 _QUIET = 0.1  # of the largest acceleration and jerk: between the ramps at a motion's ends there is no more
 _AROUND = 1.2  # times those ramps is where a table's entries are close
-np.empty(8 << 20, np.uint8)
-"""glibc keeps the memory that arrays leave, up to twice the largest block that was freed (mallopt(3),
-M_MMAP_THRESHOLD). Without this one, which is never written, it gives the memory back after each call of ``excess``,
-and the system zeroes it again, page by page: 1500 times in the plan of a jog, a quarter of its time."""
 _SHAPES, _WAYS = np.frombuffer(RAMP_SHAPES, np.uint8), np.frombuffer(RAMP_WAYS, np.uint8)
 
 
@@ -85,12 +81,14 @@ class Ramps:
             self._per_s = side / edge_s
             self._less_per_s = (self._last - 2 * side) / float(self._middle_s) - self._per_s
         time_s = entry_times_s(self._last, self.duration_s, self.edge_bits)
-        # of each joint: speed, acceleration and jerk, each over the most of the jerk, with their differences; 0 after
-        # the end; and the factor for those of the acceleration
-        self._joints = []
-        for (at_s, rows), limit in zip(sampled, most, strict=True):
-            scaled = [np.interp(time_s, at_s, row, right=0.0) / (EXCESS * limit[2]) for row in rows]
-            self._joints.append((*_with_differences(scaled), np.float32(limit[2] / limit[1])))
+        # speed, acceleration and jerk of each joint, (3, J, T), over the most of the jerk, and their differences; 0
+        # after the end; and the factors for those of the acceleration, (J, 1, 1)
+        scaled = np.zeros((3, len(splines), len(time_s)))
+        for number, ((at_s, rows), limit) in enumerate(zip(sampled, most, strict=True)):
+            for kind, row in enumerate(rows):
+                scaled[kind, number] = np.interp(time_s, at_s, row, right=0.0) / (EXCESS * limit[2])
+        self._values, self._steps = _with_differences(scaled)
+        self._factors = np.array([limit[2] / limit[1] for limit in most], np.float32)[:, None, None]
 
     def _places(self, time_s: Single) -> Single:
         """Numbers of samples at times of the motion, float32."""
@@ -133,8 +131,8 @@ class Ramps:
         """The shortest times to rest (N,) from ``starts_s`` if no joint had to stay on its path."""
         first = np.minimum(np.rint(self._places(starts_s.astype(np.float32))), self._last).astype(np.intp)
         found = np.full(len(starts_s), SHORTEST_S)
-        for values, _, factor in self._joints:
-            speed, acceleration = values[:2].take(first, axis=1).astype(float)
+        speeds, accelerations, _ = self._values.take(first, axis=2).astype(float)
+        for speed, acceleration, factor in zip(speeds, accelerations, self._factors[:, 0, 0], strict=True):
             acceleration = np.where(speed < 0.0, -acceleration, acceleration)
             # when the acceleration is 0, with the most of the jerk, 1
             speed = np.abs(speed) + 0.5 * acceleration**2
@@ -169,24 +167,21 @@ class Ramps:
         rate1, rate2 = change * (slope / length), size * (bend / (length * length))
         square = rate * rate
         cube, thrice = square * rate, np.float32(3.0) * rate * rate1
-        worst = np.full(first.shape[1:], _LEAST_EXCESS, np.float32)
-        for values, steps, factor in self._joints:
-            # every number is inside; "wrap" is the quickest of numpy's modes
-            rows = steps.take(first, axis=1, mode="wrap")
-            rows *= share
-            rows += values.take(first, axis=1, mode="wrap")
-            speed, acceleration, jerk = rows
-            jerk *= cube
-            jerk += acceleration * thrice
-            jerk += speed * rate2
-            acceleration *= square
-            speed *= rate1
-            acceleration += speed
-            found, of_jerk = np.abs(rows[1:], out=rows[1:]).max(axis=1)
-            found *= factor
-            np.maximum(worst, found, out=worst)
-            np.maximum(worst, of_jerk, out=worst)
-        return np.asarray(worst.max(axis=0), dtype=float)
+        # every number is inside; "wrap" is the quickest of numpy's modes
+        rows = self._steps.take(first, axis=2, mode="wrap")
+        rows *= share
+        rows += self._values.take(first, axis=2, mode="wrap")
+        speed, acceleration, jerk = rows
+        jerk *= cube
+        jerk += acceleration * thrice
+        jerk += speed * rate2
+        acceleration *= square
+        speed *= rate1
+        acceleration += speed
+        found, of_jerk = np.abs(rows[1:], out=rows[1:]).max(axis=2)
+        found *= self._factors
+        worst = np.maximum(found, of_jerk).max(axis=(0, 1), initial=_LEAST_EXCESS)
+        return np.asarray(worst, dtype=float)
 
 
 def _essential(trajectory: Trajectory, limits: Array) -> tuple[list[JointSpline], list[Array]]:
@@ -229,11 +224,11 @@ def _edge_bits(times_s: Sequence[Array], loads: Sequence[Array], duration_s: flo
     return bits if bits >= LEAST_EDGE_BITS else 0
 
 
-def _with_differences(rows: Sequence[Array]) -> tuple[Single, Single]:
-    """The rows (T,), followed by zeros, and the differences between their values."""
-    found = np.zeros((2, len(rows), len(rows[0]) + 2), np.float32)
-    found[0, :, :-2] = rows
-    found[1, :, :-3] = np.diff(found[0, :, :-2])
+def _with_differences(rows: Array) -> tuple[Single, Single]:
+    """The rows (..., T), followed by zeros, and the differences between their values."""
+    found = np.zeros((2, *rows.shape[:-1], rows.shape[-1] + 2), np.float32)
+    found[0, ..., :-2] = rows
+    found[1, ..., :-3] = np.diff(found[0, ..., :-2])
     return found[0], found[1]
 
 

@@ -28,7 +28,7 @@ from armtempo.planning.tool import Tool
 from armtempo.planning.variables import MotionVariables, time_points
 from armtempo.splines import bspline
 
-_PARTS, _COARSE_PARTS = (1, 2, 5), (4, 4, 4)
+_PARTS, _COARSE_PARTS = (1, 2, 4), (4, 4, 4)
 """Points per segment at which speed, acceleration and jerk are kept besides peaks: on many segments, and on few."""
 _FINE = 16
 """Segments per via point that are many."""
@@ -36,7 +36,7 @@ _CORRIDOR_PARTS = 4
 """Points per segment at which the tool's corridor is enforced."""
 _PEAK_PARTS = 16
 """Points per segment on which peaks are looked for."""
-_PEAK_THRESHOLDS = 0.95, 0.999
+_PEAK_THRESHOLDS = 0.95, 0.99
 """Peaks that become points after the first solve, and after a later one."""
 _TIGHTENED = 2
 """After so many solves peaks not only become points: next to them the limit is lowered too, until they keep it."""
@@ -48,9 +48,13 @@ _SMOOTHING, _SMOOTHED = 0.075, 0.1
 _LEAST_STEP = 1e-3
 """Least difference of time control points, as a fraction of their mean: rounding errors of angles are divided
 by its cube."""
-_FIRST = Goal(gap=2e-3, violation=1e-3)
+_COARSE, _FIRST = Goal(gap=5e-3, violation=1e-3), Goal(gap=2e-3, violation=1e-3)
 _AGAIN = Goal(gap=3e-4, violation=1e-4, first_gap=1e-2, least_slack=2e-3)
-"""Goals of the first solve, whose peaks are added to the points, and of the later ones, which start from its result."""
+"""Goals of the first solve, on few segments and on many, whose peaks are added to the points, and of the later ones,
+which start from its result."""
+_GAP_PART, _MOST_GAP = 0.3, 1e-3
+_VIOLATION_PART, _MOST_VIOLATION = 0.1, 3e-4
+"""A later solve is no more exact than these parts of the excess of the one before: its peaks will move."""
 _TOOL_KEPT = 0.9995
 """Fraction of the tool's tolerances that a solve may use: it meets them to about half of the rest."""
 _ROUNDED = 1e-10
@@ -258,19 +262,20 @@ class Improver:
         self._low, self._high = bounds(demand, layout)
         self._targets = _targets(demand, layout)
         self._kkt: Kkt | None = None
+        self._fine = layout.segments >= _FINE * (len(demand.via_deg) - 1)
 
     def improved(self, motion: FreeMotion, rounds: int) -> FreeMotion:
         """The motion after ``rounds`` solves, each with the peaks of the previous one; never slower than
         ``motion``."""
-        fine = self.layout.segments >= _FINE * (len(self.demand.via_deg) - 1)
-        parts = _PARTS if fine else _COARSE_PARTS
+        parts = _PARTS if self._fine else _COARSE_PARTS
         at = Ratios.grid(self.layout.segments, len(self._size), parts)
         best = here = motion.scaled(self.demand.limits)
         scale, known = np.inf, np.empty((2, 0))
         number, careful = 0, False
         for _ in range(rounds + 1):
             known = np.concatenate([known, np.full((2, len(at.kind) - known.shape[1]), np.nan)], axis=1)
-            solved, known = self._solve(here, at, scale, known, careful)
+            goal = self._goal(scale - 1.0, number + 1 == rounds)
+            solved, known = self._solve(here, at, scale, known, goal, careful)
             here = self._inside(solved, best)
             curve = here.curve(self.demand.limits)
             scale = curve.scale()
@@ -285,7 +290,7 @@ class Improver:
                 continue
             best = min(best, here, key=lambda candidate: candidate.total_s)
             number += 1
-            if scale < 1.0 + _NEAR or number == rounds:
+            if (scale < 1.0 + _NEAR and goal.gap <= _AGAIN.gap) or number == rounds:
                 break
         return best
 
@@ -337,7 +342,7 @@ class Improver:
         return AngleRows(self.variables.size, low / self._size, high / self._size)
 
     def _solve(
-        self, motion: FreeMotion, at: Ratios, scale: float, known: Array, careful: bool
+        self, motion: FreeMotion, at: Ratios, scale: float, known: Array, goal: Goal, careful: bool
     ) -> tuple[FreeMotion, Array]:
         """The motion that keeps R ratios within their limits, and the multipliers of these, (2, R).
 
@@ -362,9 +367,7 @@ class Improver:
         if careful:
             x = interior_point.minimise(program, start, _CAREFUL).x
         else:
-            x, multipliers = slack_method.minimise(
-                program, start, program.linear, _FIRST if first else _AGAIN, multipliers
-            )
+            x, multipliers = slack_method.minimise(program, start, program.linear, goal, multipliers)
         x = met(self.variables, program.equalities, x)
         solved = replace(
             motion,
@@ -375,6 +378,18 @@ class Improver:
         found = np.empty_like(known)
         found[:, limit_rows.order] = multipliers[: known.size].reshape(2, -1)
         return solved, found
+
+    def _goal(self, excess: float, last: bool) -> Goal:
+        """Of a solve, by how much the one before exceeded the limits, inf for the first, and whether it is the last."""
+        if excess == np.inf:
+            return _FIRST if self._fine else _COARSE
+        if last:
+            return _AGAIN
+        return replace(
+            _AGAIN,
+            gap=min(max(_AGAIN.gap, _GAP_PART * excess), _MOST_GAP),
+            violation=min(max(_AGAIN.violation, _VIOLATION_PART * excess), _MOST_VIOLATION),
+        )
 
     def _smoothing(self) -> Array:
         """Weights of the steps between time differences; none where a dwell begins and ends."""
