@@ -131,8 +131,14 @@ class _Recorded(Cell):
         super().__init__(table, work)
         self._run = work.run
 
-    def goto(self, posture: str | Place | Sequence[float], speed: float = 1.0, wait: bool = True) -> None:
-        super().goto(posture, speed, wait)
+    def goto(
+        self,
+        posture: str | Place | Sequence[float],
+        speed: float = 1.0,
+        wait: bool = True,
+        line: bool = False,
+    ) -> None:
+        super().goto(posture, speed, wait, line)
         where = posture.name if isinstance(posture, Place) else posture
         self._run.calls.append(("goto", where if isinstance(where, str) else tuple(where)))
 

@@ -130,7 +130,7 @@ CASES = {
         0,
         ("MemoryError",),
     ),
-    "homes": Case("cell.home()\n", "program_failed", 2, ("the switch of joint 1 stays pressed",)),
+    "homes": Case("cell.home()\n", "program_failed", 2, ("joint 1: its limit switch is still pressed",)),
 }
 RECURSES = {
     "fills": CASES["fills"],

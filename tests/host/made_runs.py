@@ -20,7 +20,6 @@ from armtempo.model.sequence import Sequence
 from armtempo.model.steps import Count, Goto, Repeat
 from armtempo.planning import planner, sequence_planner
 from armtempo.report import arm_picture, drawing, plots, run_folder
-from armtempo.report.run_folder import RunRow
 from armtempo.splines.trajectory import Trajectory
 from armtempo_shared.limits import SAMPLE_TICKS, TICK_HZ
 from armtempo_shared.sequence import COUNT, MOVE
@@ -122,7 +121,7 @@ def make_sequence(
     if blind:
         scales[0] = replace(scales[0], counts_per_deg=0.0)
     path.mkdir(parents=True)
-    rows = tuple(RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words) for row in plan.rows)
+    rows = tuple(map(run_folder.run_row, plan.rows))
     names = tuple(f"pick-{number}" for number in range(1, len(plan.legs) + 1))
     folder = run_folder.RunFolder(path, "pick", tuple(scales), {"port": "sim"}, legs=names, rows=rows)
     folder.write_legs(motion.data for motion in encoded_plan.of_plan(plan).legs)

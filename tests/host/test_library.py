@@ -202,6 +202,7 @@ def test_a_run_on_the_virtual_board(plan: armtempo.Plan, arm: armtempo.Arm, tmp_
     assert armtempo.Run.load(run.path).plan is not None
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_second_run_of_the_same_board_starts_where_it_should(
     plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path
@@ -331,6 +332,7 @@ def test_a_real_arm_does_not_move_by_surprise(plan: armtempo.Plan, arm: armtempo
         assert board.status().run == 0  # nothing was ever started
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_arm_goes_where_a_motion_begins(plan: armtempo.Plan, arm: armtempo.Arm, tmp_path: Path) -> None:
     with launch(LaunchOptions(arm=arm)) as process, armtempo.connect(process.port) as board:

@@ -69,6 +69,7 @@ def written(text: str, folder: Path, name: str = "pick.py") -> Path:
             2,
             "joint 2 at 1000 degrees is outside of its range",
         ),
+        ("cell.goto('home', line=True)\n", 2, "plan a motion with a straight line of the tool"),
         ("cell.move('home')\n", 2, "the cell has no 'move'"),
         ("cell.at(3)\n", 2, "the cell has no 'at'"),
         ("cell.goto()\n", 2, "missing a required argument"),
@@ -483,7 +484,7 @@ def test_what_a_program_raises_passes_and_endless_ones_end(
     with pytest.raises(CellError, match="'log' is still open for writing: close it before the arm moves"):
         testing.run(written(f"{log}cell.goto([5, -60, 40])\n", tmp_path), ARM)
     assert (tmp_path / "log").read_text() == "x"
-    moves = f"{log}log.close()\ncell.goto([5, -60, 40], wait=False)\n"
+    moves = f"{log}log.close()\ncell.goto([5, -60, 40], wait=False, line=False)\n"
     for call in ("os.remove('log')", "os.rename('log', 'old')", "from os import mkdir as make; make('new')"):
         with pytest.raises(CellError, match=r"os\.\w+: the flash cannot be written while the arm moves"):
             testing.run(written(f"{moves}{call}\n", tmp_path), ARM, motion_s=1.0)
@@ -496,6 +497,8 @@ def test_what_a_program_raises_passes_and_endless_ones_end(
     for pin in ("PA15", "E7", "PB8"):
         with pytest.raises(CellError, match=f"pin {pin[-3:].lstrip('P')} is taken by the arm"):
             testing.run(written(pins.format(pin), tmp_path), ARM)
+    with pytest.raises(CellError, match="plan a motion with a straight line"):
+        testing.run(written("line = True\ncell.goto('home', line=line)\n", tmp_path), ARM)
     with pytest.raises(NameError):
         testing.run(written("print(__file__)\n", tmp_path), ARM)
     source = (

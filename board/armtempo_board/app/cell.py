@@ -79,6 +79,9 @@ if TYPE_CHECKING:
 
 
 TOO_MANY_COUNTERS = "more than %d counters" % MAX_COUNTERS
+NO_LINE = (
+    "goto: the board moves all joints together; plan a motion with a straight line of the tool, and run it"
+)
 _FULL = 65535  # value of an output at the upper end of its range
 _LONGEST_S = 3600.0
 _LEAST_PERCENT = 1
@@ -119,13 +122,22 @@ class Cell:
         self._check_files()
         self._work.home(plan)
 
-    def goto(self, posture: "str | Place | Sequence[float]", speed: float = 1.0, wait: bool = True) -> None:
+    def goto(
+        self,
+        posture: "str | Place | Sequence[float]",
+        speed: float = 1.0,
+        wait: bool = True,
+        line: bool = False,
+    ) -> None:
         """Move to a posture, all joints together; ``speed``: 0.01 to 1.
 
         ``posture``: a name, the joints' angles in degrees, or a place of a pallet.
 
-        A sliding joint is given in mm. ``wait`` False: return at once, while the arm moves.
+        A sliding joint is given in mm. ``wait`` False: return at once, while the arm moves. ``line``: False, as only a
+        planned motion moves the tool along a line.
         """
+        if line:
+            raise CellError(NO_LINE)
         target = self._target(posture)
         percent = _percent(speed)
         self._rest()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from armtempo_board.app.cell import Cell
+from armtempo_board.app.cell import NO_LINE, Cell
 from armtempo_shared.program import EACH, FREE, MARK, STILL
 from armtempo_shared.sequence import MAX_COUNTERS
 
@@ -160,8 +160,12 @@ class _Reader:
                 raise InputError(f"{self._place(node)}{error.problem}", error.hint) from None
             self.homes = self.homes or node.lineno
         first = next(iter(given.values()), None)
-        if name == "goto" and isinstance(first, ast.Tuple | ast.List):
-            self._check_posture(first)
+        if name == "goto":
+            line = given.get("line")
+            if isinstance(line, ast.Constant) and line.value:
+                raise InputError(f"{self._place(node)}{NO_LINE}", "see 'armtempo plan', line = true in a job")
+            if isinstance(first, ast.Tuple | ast.List):
+                self._check_posture(first)
         if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
             return
         text = first.value

@@ -131,6 +131,12 @@ class LiveArm:
             return self.guided
         return self.state is not None and all(joint.known for joint in self.state.joints)
 
+    def known_alone(self, joint: int) -> float | None:
+        """Where one joint is, deg or mm, if the board knows it though perhaps not of all; None if not."""
+        if self.sought or self.state is None or not self.state.joints[joint].known:
+            return None
+        return self.state.joints[joint].position
+
     @property
     def fault(self) -> str:
         """The pending fault and its cure; "" for none."""

@@ -27,7 +27,8 @@ def texts(operator: PanelBoard) -> dict[str, str]:
         "armtempo-unknown": words.OLD_STATE.format(age=live.age_s) if is_old(operator) else words.UNKNOWN,
     }
     for number, (angle, joint) in enumerate(zip(live.angles_deg, operator.arm.driven, strict=True), 1):
-        found[f"armtempo-angle-{number}"] = f"{angle:.2f}{joint.unit.sign}" if live.known else "?"
+        here = angle if live.known else live.known_alone(number - 1)
+        found[f"armtempo-angle-{number}"] = "?" if here is None else f"{here:.2f}{joint.unit.sign}"
     return found
 
 

@@ -135,10 +135,6 @@ class PanelPage:
         def why_not() -> str:
             return (self.operator.why_not(self.client, needs) if needs is not None else "") or more()
 
-        if isinstance(
-            element, DisableableElement
-        ):  # ``on_press`` says why a press just after that is refused
-            element.ignores_events_when_disabled = False
         control = _Control(element, why_not, is_held)
         control.grey(control.why_not())
         self.controls.append(control)
@@ -183,6 +179,8 @@ class PanelPage:
             self.answer(said, self.refusal(take))
             return found[0] if found else None
 
+        if isinstance(element, DisableableElement):
+            element.ignores_events_when_disabled = False
         element.on(event, pressed, js_handler="(event) => armtempo.command(event, emit)")
 
     def answer(self, said: Any, refusal: str) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from threading import Lock
@@ -13,10 +14,12 @@ from armtempo import pipeline
 from armtempo.basics.errors import RunFolderError
 from armtempo.panel import words
 from armtempo.report import run_reader, run_report
-from armtempo.report.run_folder import META
+from armtempo.report.run_folder import META, RUNNING
 
 _known: dict[Path, tuple[int, PastRun]] = {}
 """What was read, with the time of its file."""
+_WRITTEN_S = 60.0
+"""Samples of a run that goes on are written more often."""
 _making = Lock()
 """Pages are made one at a time: two that are asked for at once may be the same file."""
 
@@ -33,7 +36,15 @@ class PastRun:
 
 def listed(folder: Path, most: int) -> list[PastRun]:
     """The newest runs in a folder, at most so many, the newest first."""
-    return [_read(found / META) for found in run_reader.folders(folder)[:most]]
+    return [_with_end(_read(found / META)) for found in run_reader.folders(folder)[:most]]
+
+
+def _with_end(run: PastRun) -> PastRun:
+    """The run, without the claim that it is running still if nothing is written any more: its program was killed."""
+    if run.ending != RUNNING:
+        return run
+    written_s = max((file.stat().st_mtime for file in run.folder.iterdir()), default=0.0)
+    return replace(run, ending=words.NO_END) if time.time() - written_s > _WRITTEN_S else run
 
 
 def _read(file: Path) -> PastRun:

@@ -107,7 +107,7 @@ def _guide(page: PanelPage, press: Press) -> None:
                 operator.live.guided = False
 
     operator.guiding = True
-    page.do(press, words.BY_HAND, work, Needs.MOVE)
+    page.do(press, words.BY_HAND.rstrip("…"), work, Needs.MOVE)
 
     def end(press: Press) -> None:
         operator.guiding = False

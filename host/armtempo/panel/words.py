@@ -103,7 +103,7 @@ BY_HAND = "Guide by hand…"
 SURE_BY_HAND = (
     "The motors' current is switched off: somebody must hold the arm, or it sinks. The encoders are read."
 )
-GUIDING, GUIDED = "Guide the arm. It is held again after:", "The current on"
+GUIDING, GUIDED = "Guide the arm: nothing else holds it.", "Hold it again"
 VIEW, FRAMES_SHOWN = "View", "Frames"
 PATH_SPEED = "0 … {fastest:.0f} mm/s"
 LIMIT, IN_PLAN = "limit of {names}", "{name}, planned"
@@ -204,7 +204,7 @@ DOTTED = "Lines: measured, or commanded for a joint without an encoder. Dotted: 
 PLANNED = "{name}: {total:.3f} s · {file}"
 LEFT = "{name}: {part:.0%}, {left:.0f} s left"
 WRONG_REPEAT, RIGHT_REPEAT = "Repetitions: {times} are not possible", "give 1 to {most}"
-NO_RUNS, UNREADABLE = "Nothing was recorded here yet.", "cannot be read"
+NO_RUNS, UNREADABLE, NO_END = "Nothing was recorded here yet.", "cannot be read", "no end recorded"
 CHOOSE_TWO = "Choose two runs or more."
 RUN_COLUMNS = ("Run", "Date", "Duration", "End", "")
 STORED, PAST_RUNS, REPORT, COMPARE = "Stored motions", "Past runs", "Report", "Compare"

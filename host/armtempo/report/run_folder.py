@@ -30,7 +30,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from armtempo_shared import limits
-from armtempo_shared.sequence import ENDINGS, FINISHED
+from armtempo_shared.sequence import ENDINGS, FINISHED, MOVE
 
 from armtempo.basics.atomic_file import replace_text
 from armtempo.basics.errors import InputError, RunFolderError
@@ -39,6 +39,7 @@ from armtempo.link.board_messages import Positions, RowBegun, Sample, SequenceSt
 from armtempo.link.follow import Gap
 from armtempo.model.arm import Arm
 from armtempo.model.joint_unit import DEG, PRISMATIC, REVOLUTE, JointUnit, of_type
+from armtempo.model.leg import SequenceRow, only_row
 from armtempo.model.transmission import Transmission
 
 FORMAT = "armtempo run"
@@ -87,9 +88,9 @@ class RunRow:
     """What it does."""
 
 
-def only_row(name: str) -> RunRow:
-    """The row of a motion."""
-    return RunRow(1, 1, f"run {name}")
+def run_row(row: SequenceRow) -> RunRow:
+    """The same row of a plan."""
+    return RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words)
 
 
 @dataclass(frozen=True)
@@ -261,7 +262,7 @@ class RunFolder:
 
     def __post_init__(self) -> None:
         if not self.rows:
-            self.legs, self.rows = (self.name,), (only_row(self.name),)
+            self.legs, self.rows = (self.name,), (run_row(only_row(self.name)),)
 
     def write(self) -> None:
         """Write run.json again."""

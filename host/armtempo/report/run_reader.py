@@ -18,6 +18,7 @@ from armtempo.basics.errors import RunFolderError
 from armtempo.basics.text import visible
 from armtempo.link.follow import Gap
 from armtempo.model.joint_unit import REVOLUTE, TYPES
+from armtempo.model.leg import only_row
 from armtempo.model.transmission import coupling_problem
 from armtempo.report.run_folder import (
     FORMAT,
@@ -29,7 +30,7 @@ from armtempo.report.run_folder import (
     RunLeg,
     RunRow,
     leg_file,
-    only_row,
+    run_row,
     transmission,
 )
 
@@ -186,7 +187,7 @@ def description(folder: Path) -> dict[str, Any]:
 def _of_motion_1(meta: Mapping[str, Any]) -> dict[str, Any]:
     """The entries of version 2 for a motion of version 1."""
     name = str(meta["name"])
-    return {"legs": [{"name": name, "file": "motion.bin"}], "rows": [vars(only_row(name))]}
+    return {"legs": [{"name": name, "file": "motion.bin"}], "rows": [vars(run_row(only_row(name)))]}
 
 
 def _of_sequence_1(meta: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from itertools import chain
 from pathlib import Path
 
 from armtempo_shared.limits import TICK_HZ
-from armtempo_shared.sequence import MOVE
 
 from armtempo.basics.errors import LinkError
 from armtempo.basics.progress import Progress
@@ -18,7 +17,6 @@ from armtempo.link import Client
 from armtempo.link.board_messages import RowBegun, Sample, SequenceState
 from armtempo.link.follow import Followed, Gap, MotionFollower, RunEnd, SequenceWatcher, number_in_run
 from armtempo.model import arm_json
-from armtempo.model.leg import SequenceRow
 from armtempo.report import run_folder
 from armtempo.report.run_folder import (
     COMPLETE,
@@ -27,7 +25,6 @@ from armtempo.report.run_folder import (
     Recording,
     Repetition,
     RunFolder,
-    RunRow,
 )
 from armtempo.robot.running import fault_name, readable
 
@@ -91,7 +88,7 @@ def new_run(parent: Path, encoded: Encoded, port: str, client: Client) -> RunFol
     """A new run folder with everything that is needed to repeat the run."""
     name, arm, plan = encoded.name, encoded.arm, encoded.plan
     where = {"arm": arm.name, "port": port, "virtual": client.info.virtual, "board": vars(client.info)}
-    rows = tuple(map(_row, encoded.rows))
+    rows = tuple(map(run_folder.run_row, encoded.rows))
     with run_folder.new_folder(parent, name) as path:
         names = tuple(leg.name for leg in encoded.legs)
         folder = RunFolder(path, name, run_folder.scales(arm), where, legs=names, rows=rows)
@@ -102,10 +99,6 @@ def new_run(parent: Path, encoded: Encoded, port: str, client: Client) -> RunFol
             plan.save(path / (run_folder.SEQUENCE if plan.is_sequence else run_folder.TRAJECTORY))
         folder.write()
     return folder
-
-
-def _row(row: SequenceRow) -> RunRow:
-    return RunRow(row.step, row.number + 1 if row.op == MOVE else 0, row.words)
 
 
 class Recorder:

@@ -58,6 +58,10 @@ def test_an_arm_that_is_not_homed_is_drawn_as_unknown_at_home(operator: PanelBoa
     assert told["ghost"] == shape.poses(np.array(ARM.home_deg))
     assert told["texts"]["armtempo-where"] == "position unknown"
     assert told["texts"]["armtempo-angle-1"] == "?"
+    first, *others = unhomed().joints
+    operator.live.ask(Telling(board_state(joints=(replace(first, known=True), *others))))  # type: ignore[arg-type]
+    texts = layout.message(operator, shape)["texts"]
+    assert [texts[f"armtempo-angle-{number}"] for number in (1, 2)] == ["0.00°", "?"]
     operator.live.ask(Telling(board_state()))  # type: ignore[arg-type]
     told = layout.message(operator, shape)
     assert told["links"] == shape.poses(np.array(ARM.home_deg))

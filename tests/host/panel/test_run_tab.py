@@ -47,6 +47,11 @@ def test_runs_of_the_command_line_are_listed_the_newest_first(tmp_path: Path) ->
         ("feed-001", "13.6 s", "complete"),
     ]
     assert {row.ending for row in rows[2:]} == {"cannot be read"}
+    meta["repetitions"] = [{**made, "state": "running", "fault": ""}]
+    (tmp_path / name / "run.json").write_text(json.dumps(meta))
+    assert past_runs.listed(tmp_path, 1)[0].ending == "running"
+    os.utime(tmp_path / name / "run.json", (time.time() - 100,) * 2)  # its program was killed
+    assert past_runs.listed(tmp_path, 1)[0].ending == words.NO_END
     with pytest.raises(RunFolderError, match="damaged"):
         past_runs.report(tmp_path, "damaged")
 

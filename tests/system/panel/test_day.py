@@ -149,10 +149,10 @@ def test_a_target_is_shown_then_approached_while_held_and_postures_are_stored(
     assert f"[posture.{_LONG}]\nangles_deg = [31" in (panel.folder / "arm.toml").read_text()
     page.get_by_role("button", name="Guide by hand…").click()
     panels.answer(page, "Guide by hand…")
-    wait_for(page, "unhomed", "Guide by hand…")
+    wait_for(page, "unhomed", "Guide by hand")
     wait_for(page, "31.", place="armtempo-where")  # the encoders tell
-    panels.answer(page, "The current on")
-    wait_for(page, "Guide by hand…: done", place="armtempo-said")
+    panels.answer(page, "Hold it again")
+    wait_for(page, "Guide by hand: done", place="armtempo-said")
     wait_for(page, "idle")
     page.reload()
     page.wait_for_selector("text=In control")  # as before
