@@ -17,7 +17,7 @@ from armtempo.model.tool_pose import Pose
 from armtempo.optimise.reduced_kkt import ReducedFactor, ReducedKkt
 from armtempo.planning import checks, collocation, motion_program, planner, rest_to_rest
 from armtempo.planning.collocation import Curve, Ratios
-from armtempo.planning.free import free_path, free_start
+from armtempo.planning.free import corridor, free_path, free_start
 from armtempo.planning.free.angle_bounds import AngleRows
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Improver, Tolerance
 from armtempo.planning.limit_rows import LimitRows
@@ -214,7 +214,7 @@ def test_a_corridor_too_narrow_to_prove_is_the_spline_in_bounded_memory(
     assert plan.total_s == planner.plan(ARM, replace(FEED, path="through", refine="auto")).total_s
     assert any("no faster path" in note for note in plan.notes)
     assert faults(plan) == []
-    assert max(seen) <= 3 * free_path._MOST_PIECES
+    assert max(seen) <= 3 * corridor._MOST_PIECES
     assert 'with refine = 6; try refine = "auto" (--refine auto)' in plan.notes[-1]
     assert len(seen) < 500
 
@@ -358,8 +358,8 @@ def test_the_tools_deviation_is_bounded_sharply(away_deg: float, linkage: bool) 
         tool.at(np.einsum("ku,skj->suj", at, pieces).reshape(-1, 3)).position_mm for pieces in (path, through)
     ]
     reached = np.linalg.norm(places[0] - places[1], axis=1).max()
-    bound = free_path.deviation_mm(path, through, tool)
-    assert reached <= bound <= reached * (1.0 + 2.0 * free_path.SHARP) + 1e-6
+    bound = corridor.tool_deviation_mm(path, through, tool)
+    assert reached <= bound <= reached * (1.0 + 2.0 * corridor.SHARP) + 1e-6
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from armtempo.model.parts import Limits
 from armtempo.model.tool_pose import Pose
 from armtempo.planning import board_limits, checks, lower_bounds, through_plan
 from armtempo.planning.fixed_path import FixedPath
-from armtempo.planning.free import free_path
+from armtempo.planning.free import corridor, free_path
 from armtempo.planning.free.angle_bounds import of_path
 from armtempo.planning.free.free_motion import Demand, FreeMotion, Tolerance, through
 from armtempo.planning.free.free_path import Effort, Shortest
@@ -302,7 +302,7 @@ def _notes(
         demand = _demand(arm, job, via_deg, joints)
         if job.corridor_deg is not None:
             path = of_path(one.motion.angle_points_deg, DEGREE)
-            away = free_path.joint_deviation_deg(path, through(demand, one.motion.layout))
+            away = corridor.joint_deviation_deg(path, through(demand, one.motion.layout))
             notes.append(
                 f"no joint leaves the spline through the via points by more than {away:.4g} deg (proven)"
             )
