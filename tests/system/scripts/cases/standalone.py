@@ -351,7 +351,7 @@ def case_a_switch_that_never_trips_ends_it_in_words_when_powered(world):  # not 
         status = yield from world.status()
         assert (status["state"], status["fault"], status["known"]) == ("fault", "program_failed", 0), status
         (told,) = notices(world)
-        assert "line 2" in told and "no switch of joint 2 tripped" in told, told
+        assert "line 2" in told and "joint 2: no limit switch tripped" in told, told
     steps = world.steps()
     yield from world.ask("clear")
     yield from switches.until_it_ends()
