@@ -153,7 +153,7 @@ def test_what_an_encoder_shows(part: float, lines: list[str]) -> None:
     ("reversed_", "further", "said", "verdict"),
     [
         (5, 6, "none that its encoder shows", Level.NOTE),
-        (3, 6, "0.27° within 0.18°", Level.NOTE),
+        (3, 6, "0.27°, read to 0.18°", Level.NOTE),
         (1, 6, "it did not move in the first 0.51°", Level.ERROR),
         (1, 2, "", None),
     ],
@@ -174,10 +174,10 @@ def test_what_a_reversal_shows(reversed_: int, further: int, said: str, verdict:
         (6, "none that its encoder shows beside the 0.2° that its motor crosses", ""),
         (
             3,
-            "0.47° within 0.18°, of the joint against its motor, which crosses 0.2°",
+            "0.47°, read to 0.18°, of the joint against its motor, which crosses 0.2°",
             "motor: backlash_deg = 0.47",
         ),
-        (9, "0° within 0.18°", "motor: backlash_deg = 0 or so"),
+        (9, "0°, read to 0.18°", "motor: backlash_deg = 0 or so"),
     ],
 )
 def test_what_a_reversal_shows_of_a_motor_that_crosses_backlash(reversed_: int, said: str, line: str) -> None:

@@ -97,7 +97,8 @@ def test_backlash_by_the_encoder_of_the_joint(tmp_path: Path, monkeypatch: pytes
     lines = {line.what: line for line in found.lines}
     assert lines["joint 1: encoder"].verdict is Level.GOOD
     said = lines["joint 1: backlash"].measured.split("°")[0]
-    assert float(said) == pytest.approx(0.3, abs=0.03)
+    # as a motor stops, its rotor swings and pushes the joint on by 3 or 4 counts of 0.01 degrees
+    assert float(said) == pytest.approx(0.3, abs=0.05)
     (line,) = found.data["arm_file"]
     assert line.startswith(f"joint 1: motor: backlash_deg = {said} or so, ")
 

@@ -255,7 +255,7 @@ def judge_backlash(
         cure = "look for a loose coupling, belt or set screw; its encoder was not checked"
         return judged(PART, what, measured, f"less than {size_deg:.2g}{sign}", False, cure), []
     whole_deg = max(crossed_deg + lost_deg, 0.0)
-    measured = f"{whole_deg:.2g}{sign} within {within_deg:.2g}{sign}, of the joint against its motor"
+    measured = f"{whole_deg:.2g}{sign}, read to {within_deg:.2g}{sign}, of the joint against its motor"
     if crossed_deg:
         measured += f", which crosses {crossed_deg:g}{sign}"
     return Measurement(PART, what, measured), [
