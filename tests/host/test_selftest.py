@@ -165,7 +165,7 @@ def test_what_a_reversal_shows(reversed_: int, further: int, said: str, verdict:
     line, lines = motor_test.judge_backlash(joint, *moves)
     assert (line.verdict if line else None) is verdict
     assert (line.measured if line else "").startswith(said)
-    assert bool(lines) == ("within" in said)
+    assert bool(lines) == ("read to" in said)
 
 
 @pytest.mark.parametrize(
